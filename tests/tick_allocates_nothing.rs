@@ -55,7 +55,7 @@ const FAULTS: &str = "
 [[fault]]\nkind = \"drop\"\nchance = 0.2\n
 [[fault]]\nkind = \"duplicate\"\nchance = 0.2\n
 [[fault]]\nkind = \"delay\"\nby = \"20ms\"\n
-[[fault]]\nkind = \"slow-answers\"\nby = \"30ms\"\n
+[[fault]]\nkind = \"values-late\"\nby = \"30ms\"\n
 ";
 
 /// Ticks with changing values; returns the allocations in 10,000 ticks after a warm-up, both exchanges and

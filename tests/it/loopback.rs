@@ -94,7 +94,7 @@ impl Bus for Spared {
     fn faults(&self) -> &'static str {
         "[[fault]]\nkind = \"link-down\"\nat = \"1000h\"\n\
          [[fault]]\nkind = \"delay\"\nby = \"1s\"\nat = \"1000h\"\n\
-         [[fault]]\nkind = \"slow-answers\"\nby = \"1s\"\nat = \"1000h\"\n\
+         [[fault]]\nkind = \"values-late\"\nby = \"1s\"\nat = \"1000h\"\n\
          [[fault]]\nkind = \"drop\"\nchance = 1\nat = \"1000h\"\n\
          [[fault]]\nkind = \"stuck\"\nsignal = \"speed\"\nvalue = 9\nat = \"1000h\"\n"
     }

@@ -391,13 +391,13 @@ fn a_late_socket_keeps_every_pulse() {
 }
 
 #[test]
-fn slow_answers_over_a_link_keep_every_pulse() {
-    delays(&Link::new(), "slow-answers", false);
+fn late_values_over_a_link_keep_every_pulse() {
+    delays(&Link::new(), "values-late", false);
 }
 
 #[test]
-fn slow_answers_over_a_socket_keep_every_pulse() {
-    delays(&Tcp::new(), "slow-answers", false);
+fn late_values_over_a_socket_keep_every_pulse() {
+    delays(&Tcp::new(), "values-late", false);
 }
 
 #[test]
@@ -406,7 +406,7 @@ fn a_delay_counts_ticks_of_a_stepped_bus() {
     // The frames of ticks 3 to 6 arrive 3 ticks late; when the fault ends, all remaining ones arrive at once.
     assert_eq!(bus.count(9), [0.0, 1.0, 1.0, 1.0, 1.0, 2.0, 6.0, 7.0, 8.0]);
     let mut bus =
-        Stepped::new("[[fault]]\nkind = \"slow-answers\"\nby = \"20ms\"\ntick = 3\nticks = 4\n");
+        Stepped::new("[[fault]]\nkind = \"values-late\"\nby = \"20ms\"\ntick = 3\nticks = 4\n");
     assert_eq!(bus.count(9), [0.0, 1.0, 1.0, 1.0, 2.0, 3.0, 6.0, 7.0, 8.0]);
 }
 
@@ -538,7 +538,7 @@ fn a_stepped_run_with_every_fault_repeats_itself() {
             ("duplicate", "chance = 0.1"),
             ("delay", "by = \"25ms\"\nat = \"1s\"\nfor = \"500ms\""),
             (
-                "slow-answers",
+                "values-late",
                 "by = \"35ms\"\nat = \"1200ms\"\nfor = \"500ms\"",
             ),
             ("link-down", "when = \"run\"\ntimes = 20\nticks = 3"),

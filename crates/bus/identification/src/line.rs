@@ -75,6 +75,7 @@ impl LineOptions {
             baud: self.baud,
             parity: Parity::None,
             two_stop_bits: false,
+            seven_bits: false,
             rs485: false,
         }
     }

@@ -5,7 +5,8 @@
 //! quantity and value, address.
 
 use super::function::{
-    EXCEPTION_BIT, READ_BITS, READ_REGISTERS, READ_WRITE_REGISTERS, WRITE_BITS, WRITE_REGISTERS,
+    EXCEPTION_BIT, QUEUED_REGISTERS, READ_BITS, READ_REGISTERS, READ_WRITE_REGISTERS, WRITE_BITS,
+    WRITE_REGISTERS,
 };
 use super::{Exception, Function, Identification, Span, Table, Tables};
 
@@ -21,6 +22,8 @@ pub struct Done {
 }
 
 /// Answers the request `pdu`, and appends the answer's PDU to `reply`.
+///
+/// The functions 8, 11, 12, 20 and 21 belong to a server's state, and are refused here.
 ///
 /// # Panics
 ///
@@ -65,6 +68,7 @@ pub(super) fn length(beginning: &[u8]) -> Option<usize> {
         1..=6 | 8 => Some(5),
         7 | 11 | 12 | 17 => Some(1),
         15 | 16 => counted(5),
+        20 | 21 => counted(1),
         22 => Some(7),
         23 => counted(9),
         24 => Some(3),
@@ -140,6 +144,13 @@ fn act(
             Ok(wrote)
         }
         Function::ReadWriteRegisters => read_write(data, tables, reply),
+        Function::ReadExceptionStatus => read_exception_status(data, tables, reply),
+        Function::ReadFifoQueue => read_queue(data, tables, reply),
+        Function::Diagnostics
+        | Function::CommEventCounter
+        | Function::CommEventLog
+        | Function::ReadFileRecord
+        | Function::WriteFileRecord => Err(Exception::ILLEGAL_FUNCTION),
         Function::ReportServerId => {
             identification.answer_server_id(data, reply)?;
             Ok(Done::default())
@@ -252,6 +263,54 @@ fn read_write(
     Ok(Done {
         read: read.read,
         ..wrote
+    })
+}
+
+fn read_exception_status(
+    data: &[u8],
+    tables: &Tables<'_>,
+    reply: &mut Vec<u8>,
+) -> Result<Done, Exception> {
+    let status = tables.map.exception_status();
+    let (table, span) = status.ok_or(Exception::ILLEGAL_FUNCTION)?;
+    if !data.is_empty() {
+        return Err(Exception::ILLEGAL_DATA_VALUE);
+    }
+    tables.read(table, span, reply)?;
+    Ok(Done {
+        read: Some((table, span)),
+        ..Done::default()
+    })
+}
+
+/// Reads a queue: a register that counts those behind it. Reading takes nothing out of it.
+fn read_queue(data: &[u8], tables: &Tables<'_>, reply: &mut Vec<u8>) -> Result<Done, Exception> {
+    const TABLE: Table = Table::HoldingRegisters;
+
+    let queues = tables.map.queues();
+    if queues.is_empty() {
+        return Err(Exception::ILLEGAL_FUNCTION);
+    }
+    let [first] = words(data)?;
+    if !queues.contains(&first) {
+        return Err(Exception::ILLEGAL_DATA_ADDRESS);
+    }
+    let begin = reply.len();
+    reply.extend_from_slice(&[0; 2]);
+    tables.read(TABLE, Span { first, count: 1 }, reply)?;
+    let queued = word(reply, begin + 2);
+    if queued > QUEUED_REGISTERS {
+        return Err(Exception::ILLEGAL_DATA_VALUE);
+    }
+    let count = 1 + queued;
+    let bytes = u16::try_from(2 * count).expect("the limit keeps it below");
+    reply.truncate(begin);
+    reply.extend_from_slice(&bytes.to_be_bytes());
+    let span = Span { first, count };
+    tables.read(TABLE, span, reply)?;
+    Ok(Done {
+        read: Some((TABLE, span)),
+        ..Done::default()
     })
 }
 

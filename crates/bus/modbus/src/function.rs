@@ -18,6 +18,8 @@ pub(super) const WRITE_BITS: usize = 1968;
 pub(super) const WRITE_REGISTERS: usize = 123;
 /// Most registers that a request writes which also reads.
 pub(super) const READ_WRITE_REGISTERS: usize = 121;
+/// Most registers in a queue, without the one that counts them.
+pub(super) const QUEUED_REGISTERS: usize = 31;
 
 /// A function that is implemented.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -35,34 +37,55 @@ pub enum Function {
     WriteCoil = 5,
     /// Write one register.
     WriteRegister = 6,
+    /// Read eight bits about the state of the device.
+    ReadExceptionStatus = 7,
+    /// Test the line, and read and clear the counters of a unit.
+    Diagnostics = 8,
+    /// Read the number of requests that were carried out.
+    CommEventCounter = 11,
+    /// Read the last events on the line.
+    CommEventLog = 12,
     /// Write coils in a row.
     WriteCoils = 15,
     /// Write registers in a row.
     WriteRegisters = 16,
     /// Read the identification of the server, which only the server's end has.
     ReportServerId = 17,
+    /// Read records of files.
+    ReadFileRecord = 20,
+    /// Write records of files.
+    WriteFileRecord = 21,
     /// Set and clear single bits of a register.
     MaskWriteRegister = 22,
     /// Write registers, then read registers.
     ReadWriteRegisters = 23,
+    /// Read a queue of registers.
+    ReadFifoQueue = 24,
     /// Encapsulated interface; only its kind 14, reading the device identification.
     DeviceIdentification = 43,
 }
 
 impl Function {
     /// All functions.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 19] = [
         Self::ReadCoils,
         Self::ReadDiscreteInputs,
         Self::ReadHoldingRegisters,
         Self::ReadInputRegisters,
         Self::WriteCoil,
         Self::WriteRegister,
+        Self::ReadExceptionStatus,
+        Self::Diagnostics,
+        Self::CommEventCounter,
+        Self::CommEventLog,
         Self::WriteCoils,
         Self::WriteRegisters,
         Self::ReportServerId,
+        Self::ReadFileRecord,
+        Self::WriteFileRecord,
         Self::MaskWriteRegister,
         Self::ReadWriteRegisters,
+        Self::ReadFifoQueue,
         Self::DeviceIdentification,
     ];
 

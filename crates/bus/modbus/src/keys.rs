@@ -6,7 +6,7 @@ use tickbus_net::serial;
 use crate::client::{PART_KEYS, PARTS};
 use crate::identity::IDENTITY_KEYS;
 use crate::line::{BAUDS, FRAMINGS, PARITIES};
-use crate::server::{RANGE_KEYS, RANGES};
+use crate::server::{FILES, QUEUES, RANGE_KEYS, RANGES};
 use crate::stations::IDENTITY_LIMIT;
 
 /// The line of both ends.
@@ -19,7 +19,7 @@ pub(crate) const LINE: &[Key] = &[
     Key::new(
         "framing",
         Shape::Choice(&names(&FRAMINGS)),
-        "\"rtu\": RTU telegrams over TCP",
+        "\"rtu\" with an address: RTU telegrams over TCP; \"udp\": over UDP; \"ascii\" with a device: Modbus ASCII",
     ),
     Key {
         is_required: false,
@@ -36,6 +36,11 @@ pub(crate) const LINE: &[Key] = &[
         "The parity of the serial port; \"even\" by default",
     ),
     Key::new(
+        "data_bits",
+        Shape::Whole(7, 8),
+        "The data bits of a character; 7 by default with ASCII, otherwise 8",
+    ),
+    Key::new(
         "stop_bits",
         Shape::Whole(1, 2),
         "The stop bits of the serial port; 1 by default, 2 without parity",
@@ -43,7 +48,7 @@ pub(crate) const LINE: &[Key] = &[
     Key::new(
         "silence",
         Shape::Duration,
-        "The pause that ends a telegram; 3.5 characters by default, 1.75 ms above 19200 baud",
+        "The pause that ends a telegram; 3.5 characters by default, 1.75 ms above 19200 baud; with ASCII 1s",
     ),
     Key::new(
         "echo",
@@ -94,6 +99,26 @@ pub(crate) const SERVER: &[Key] = &[
         "reserved",
         Shape::List(&Shape::Table(RANGE_KEYS), 1, RANGES),
         "Elements that exist beside those of [fieldbus.at] and carry nothing",
+    ),
+    Key::new(
+        "diagnostics",
+        Shape::Boolean,
+        "Functions 8, 11 and 12: counters of the line and its last events; true by default, but over TCP false",
+    ),
+    Key::new(
+        "exception_status",
+        Shape::Text,
+        "The first of eight coils or discrete inputs that function 7 reads; without it function 7 is refused",
+    ),
+    Key::new(
+        "queues",
+        Shape::List(&Shape::Text, 1, QUEUES),
+        "Holding registers that count the registers behind them, which function 24 reads as a queue",
+    ),
+    Key::new(
+        "files",
+        Shape::List(&Shape::Whole(1, 0xFFFF), 1, FILES),
+        "The numbers of the files that functions 20 and 21 read and write, each with 10,000 records",
     ),
 ];
 

@@ -1,7 +1,7 @@
-//! Modbus over TCP and, as RTU, over a serial line or TCP; server and client.
+//! Modbus over TCP and UDP, and as RTU or ASCII over a serial line or, as RTU, over TCP; server and client.
 //!
 //! The codec knows no port and no image: [`answer()`] is the server's half, which takes a request and makes
-//! the answer using [`Tables`]; [`Request`] is the client's half. [`mbap`] and [`rtu`] frame their PDUs as
+//! the answer using [`Tables`]; [`Request`] is the client's half. [`mbap`], [`rtu`] and [`ascii`] frame their PDUs as
 //! telegrams.
 //!
 //! The codec can be used without the rest. A server answers from bytes of its own:
@@ -31,7 +31,9 @@
 //! ```
 
 mod answer;
+pub mod ascii;
 mod client;
+mod coding;
 mod element_address;
 mod function;
 mod identification;
@@ -53,6 +55,7 @@ pub use answer::{Done, answer, refuse};
 pub use client::{
     AnswerError, Block, Capabilities, ClientOptions, ModbusClient, Region, Request, queries,
 };
+pub use coding::Coding;
 pub use element_address::ElementAddress;
 pub use function::{Exception, Function, PDU_LIMIT};
 pub use identification::Identification;

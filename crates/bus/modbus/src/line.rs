@@ -1,4 +1,4 @@
-//! The line in a driver.cfg: a TCP address, with one of two framings, or a serial port.
+//! The line in a driver.cfg: an address, with one of three framings, or a serial port, with one of two.
 
 use std::fmt;
 
@@ -9,13 +9,27 @@ use tickbus_base::toml_text::{Table, Value};
 use tickbus_net::Address;
 use tickbus_net::serial as serial_port;
 
-use super::rtu;
+use super::{Coding, ascii, rtu};
 
 /// The range of serial speeds, in bits per second.
 pub(super) const BAUDS: std::ops::RangeInclusive<i128> = 50..=4_000_000;
 
-/// The framings of telegrams over TCP: true for RTU.
-pub(super) const FRAMINGS: [(&str, bool); 2] = [("tcp", false), ("rtu", true)];
+/// A framing of telegrams, on whichever line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Framing {
+    Tcp,
+    Udp,
+    Rtu,
+    Ascii,
+}
+
+/// The framings by their names.
+pub(super) const FRAMINGS: [(&str, Framing); 4] = [
+    ("tcp", Framing::Tcp),
+    ("udp", Framing::Udp),
+    ("rtu", Framing::Rtu),
+    ("ascii", Framing::Ascii),
+];
 
 /// The parities of a serial port.
 pub(super) const PARITIES: [(&str, Parity); 3] = [
@@ -31,7 +45,9 @@ pub enum Line {
     Tcp(Address),
     /// RTU telegrams over TCP, as transported by serial device servers.
     RtuOverTcp(Address),
-    /// Modbus RTU over a serial port.
+    /// Telegrams of Modbus TCP, one in each UDP datagram.
+    Udp(Address),
+    /// Modbus RTU or ASCII over a serial port.
     Serial(Serial),
 }
 
@@ -42,7 +58,9 @@ pub struct Serial {
     pub device: String,
     /// The settings.
     pub settings: SerialSettings,
-    /// The silence that ends a telegram.
+    /// The coding of telegrams.
+    pub coding: Coding,
+    /// The silence that ends a telegram; with ASCII, that gives up one.
     pub silence: Nanos,
     /// True if the line echoes sent bytes, so that the echo must be dropped.
     pub echo: bool,
@@ -53,8 +71,12 @@ impl fmt::Display for Line {
         match self {
             Self::Tcp(address) => address.fmt(f),
             Self::RtuOverTcp(address) => write!(f, "{address} (RTU over TCP)"),
+            Self::Udp(address) => write!(f, "{address} (UDP)"),
             Self::Serial(serial) => {
                 write!(f, "{} at {}", serial.device, serial.settings)?;
+                if serial.coding == Coding::Ascii {
+                    f.write_str(", ASCII")?;
+                }
                 f.write_str(if serial.echo { ", which echoes" } else { "" })
             }
         }
@@ -84,13 +106,14 @@ impl Line {
         check(&address)?;
         *self = match self {
             Self::RtuOverTcp(_) => Self::RtuOverTcp(address),
+            Self::Udp(_) => Self::Udp(address),
             Self::Tcp(_) | Self::Serial(_) => Self::Tcp(address),
         };
         Ok(())
     }
 
-    /// Reads `address` and `framing`, or `device`, `baud`, `parity`, `stop_bits`, `silence`, `echo` and `rs485`; without
-    /// any of these, the default address. `check` checks an address stated in the driver.cfg.
+    /// Reads `address` or `device`, `framing`, and with `device` the settings of the port; without any of these, the
+    /// default address. `check` checks an address stated in the driver.cfg.
     pub(super) fn read(
         table: &mut Table<'_>,
         address: Address,
@@ -99,8 +122,18 @@ impl Line {
         let stated = table.take("address");
         let framing = table.take("framing");
         let device = table.take("device");
-        let serial = ["baud", "parity", "stop_bits", "silence", "echo", "rs485"]
-            .map(|key| (key, table.take(key)));
+        let framing_at = framing.as_ref();
+        let stated_framing = framing_at.map(|value| value.choice("framings", &FRAMINGS));
+        let serial = [
+            "baud",
+            "parity",
+            "data_bits",
+            "stop_bits",
+            "silence",
+            "echo",
+            "rs485",
+        ]
+        .map(|key| (key, table.take(key)));
         let Some(device) = device else {
             for (key, value) in &serial {
                 if let Some(value) = value
@@ -112,12 +145,19 @@ impl Line {
                     );
                 }
             }
-            let is_rtu = framing.map_or(Some(false), |value| value.choice("framings", &FRAMINGS));
+            let framing = stated_framing.unwrap_or(Some(Framing::Tcp));
+            if let (Some(value), Some(Framing::Ascii)) = (framing_at, framing) {
+                value.wrong(
+                    "\"ascii\" is a framing for serial ports",
+                    "name the serial port, such as device = \"/dev/ttyUSB0\", or write \"rtu\", \"tcp\" or \"udp\"",
+                );
+                return None;
+            }
             let framed = |address| {
-                Some(if is_rtu? {
-                    Self::RtuOverTcp(address)
-                } else {
-                    Self::Tcp(address)
+                Some(match framing? {
+                    Framing::Rtu => Self::RtuOverTcp(address),
+                    Framing::Udp => Self::Udp(address),
+                    Framing::Tcp | Framing::Ascii => Self::Tcp(address),
                 })
             };
             let Some(value) = stated else {
@@ -140,29 +180,39 @@ impl Line {
         if let Some(value) = &stated {
             value.wrong(
                 "\"address\" stands beside \"device\"",
-                "remove one of the two: \"address\" is for Modbus TCP, \"device\" for RTU over a serial port",
+                "remove one of the two: \"address\" is for Modbus TCP, \"device\" for a serial port",
             );
         }
-        if let Some(value) = &framing {
+        if let (Some(value), Some(Some(Framing::Tcp | Framing::Udp))) = (framing_at, stated_framing)
+        {
             value.wrong(
-                "\"framing\" stands beside \"device\"",
-                "remove one of the two: a serial port has RTU in any case, and \"framing\" is for an \"address\"",
+                "this \"framing\" stands beside \"device\"",
+                "write \"rtu\" or \"ascii\" for a serial port, or \"address\" instead of \"device\"",
             );
         }
+        let coding = match stated_framing {
+            Some(Some(Framing::Ascii)) => Coding::Ascii,
+            _ => Coding::Rtu,
+        };
         let device = serial_port::read_device(&device);
-        let [baud, parity, stop_bits, silence, echo, rs485] = serial.map(|(_, value)| value);
+        let [baud, parity, data_bits, stop_bits, silence, echo, rs485] =
+            serial.map(|(_, value)| value);
         let flag = |value: Option<Value<'_>>| value.map_or(Some(false), |value| value.boolean());
         let (echo, rs485) = (flag(echo), flag(rs485));
+        let seven_bits = read_data_bits(data_bits.as_ref(), coding);
         let settings = read_settings(baud.as_ref(), parity.as_ref(), stop_bits.as_ref(), rs485);
         let silence = silence.as_ref().map(Value::duration);
-        let (device, settings) = (device?, settings?);
-        let silence = match silence {
-            None => rtu::silence(settings.baud),
-            Some(stated) => stated?,
+        let (device, mut settings) = (device?, settings?);
+        settings.seven_bits = seven_bits?;
+        let silence = match (silence, coding) {
+            (Some(stated), _) => stated?,
+            (None, Coding::Rtu) => rtu::silence(settings.baud),
+            (None, Coding::Ascii) => ascii::SILENCE,
         };
         Some(Self::Serial(Serial {
             device,
             settings,
+            coding,
             silence,
             echo: echo?,
         }))
@@ -191,6 +241,23 @@ fn read_settings(
         baud: baud?,
         parity: parity?,
         two_stop_bits: two_stop_bits?,
+        seven_bits: false,
         rs485: rs485?,
     })
+}
+
+/// Reads the data bits of a character; returns true for seven, which ASCII has unless stated otherwise.
+fn read_data_bits(stated: Option<&Value<'_>>, coding: Coding) -> Option<bool> {
+    let Some(value) = stated else {
+        return Some(coding == Coding::Ascii);
+    };
+    let seven_bits = value.whole(7..=8)? == 7;
+    if seven_bits && coding == Coding::Rtu {
+        value.wrong(
+            "RTU has bytes of 8 bits",
+            "remove it, or write framing = \"ascii\" if the other end speaks ASCII",
+        );
+        return None;
+    }
+    Some(seven_bits)
 }

@@ -20,6 +20,10 @@ pub enum Side {
 #[derive(Clone, Debug, Default)]
 pub struct Map {
     tables: [Layout; Table::ALL.len()],
+    /// The eight bits that function 7 reads.
+    exception_status: Option<(Table, Span)>,
+    /// The holding registers with which the queues of function 24 begin.
+    queues: Vec<usize>,
     /// True if an element of one table is never one of another table as well.
     is_placed: bool,
 }
@@ -251,6 +255,31 @@ impl Map {
         }
         map.tables.iter_mut().for_each(Layout::finish);
         map
+    }
+
+    /// The same map, whose eight bits from `first` on function 7 reads, and whose holding registers `queues` function 24
+    /// can read as queues. Elements that do not exist are left out.
+    #[must_use]
+    pub fn with_extras(mut self, status: Option<(Table, usize)>, queues: &[usize]) -> Self {
+        let status = status.map(|(table, first)| (table, Span { first, count: 8 }));
+        self.exception_status = status.filter(|(table, span)| self.find(*table, *span).is_ok());
+        let exists = |first: usize| {
+            let span = Span { first, count: 1 };
+            self.find(Table::HoldingRegisters, span).is_ok()
+        };
+        let queues = queues.iter().copied();
+        self.queues = queues.filter(|first| exists(*first)).collect();
+        self
+    }
+
+    /// The eight bits that function 7 reads, if it exists.
+    pub(super) fn exception_status(&self) -> Option<(Table, Span)> {
+        self.exception_status
+    }
+
+    /// The holding registers with which the queues of function 24 begin.
+    pub(super) fn queues(&self) -> &[usize] {
+        &self.queues
     }
 
     /// The bits of the frame on `side` that consecutive elements carry. Scattered elements that are neighbours in the frame

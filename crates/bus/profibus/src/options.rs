@@ -125,6 +125,7 @@ impl BusKind for Options {
                     baud: rate.baud,
                     parity: Parity::Even,
                     two_stop_bits: false,
+                    seven_bits: false,
                     rs485: rs485?,
                 },
                 max_tsdr,

@@ -6,6 +6,7 @@
 //! | [`LocalAddress`] | Unix sockets, written there as `unix:PATH` |
 //! | [`connect()`], [`reach`], [`Dialler`] | connecting: with a stop, blocking, again and again |
 //! | [`listen()`], [`bind`] | listening: with a stop, at once |
+//! | [`bind_udp`], [`Datagrams`] | datagrams over UDP |
 //! | [`Acceptor`] | accepting clients in a poll set |
 //! | [`prepare`], [`close_gracefully`], … | what every connection needs from the system |
 //! | [`begins_like_browser`] | distinguishing a web browser from a peer |
@@ -26,6 +27,7 @@ mod message;
 mod resolve;
 pub mod serial;
 mod stream;
+mod udp;
 
 pub use acceptor::Acceptor;
 pub use address::{Address, Host};
@@ -37,3 +39,4 @@ pub use listen::{bind, listen};
 pub use local_address::LocalAddress;
 pub use message::{Inbox, Message, WireError};
 pub use stream::{Stream, close_by_reset, close_gracefully, is_for_later, prepare, watch_peer};
+pub use udp::{Datagrams, bind_udp};

@@ -24,24 +24,27 @@ pub fn listen(
     let Some(addresses) = resolve(address, clock, stop)? else {
         return Ok(None);
     };
-    let cannot = |error: io::Error| {
-        let right = match error.kind() {
-            ErrorKind::AddrNotAvailable => {
-                "write an \"address\" that this computer has, or 0.0.0.0 for all of them"
-            }
-            ErrorKind::PermissionDenied => {
-                "write a port above 1023, or get the right to use this one: on Linux by sysctl \
-                 net.ipv4.ip_unprivileged_port_start, by setcap cap_net_bind_service=+ep, or with a redirect \
-                 by nft; docs/s7.md has the lines for port 102"
-            }
-            _ if is_out_of_files(&error) => OUT_OF_FILES,
-            _ => "end the program that has this port, or write another \"address\"",
-        };
-        Error(format!("cannot listen on {address} ({error}); {right}"))
-    };
+    let cannot = |error: io::Error| cannot_listen(address, &error);
     let listener = TcpListener::bind(&addresses, clock.simulation()).map_err(cannot)?;
     let bound = listener.local_addr().map_err(cannot)?;
     Ok(Some((listener, bound)))
+}
+
+/// Why `address` cannot be listened on, and what to do.
+pub(crate) fn cannot_listen(address: &Address, error: &io::Error) -> Error {
+    let right = match error.kind() {
+        ErrorKind::AddrNotAvailable => {
+            "write an \"address\" that this computer has, or 0.0.0.0 for all of them"
+        }
+        ErrorKind::PermissionDenied => {
+            "write a port above 1023, or get the right to use this one: on Linux by sysctl \
+             net.ipv4.ip_unprivileged_port_start, by setcap cap_net_bind_service=+ep, or with a redirect \
+             by nft; docs/s7.md has the lines for port 102"
+        }
+        _ if is_out_of_files(error) => OUT_OF_FILES,
+        _ => "end the program that has this port, or write another \"address\"",
+    };
+    Error(format!("cannot listen on {address} ({error}); {right}"))
 }
 
 /// As [`listen`], but on the network of `simulation` if there is one, and a look-up of the host blocks. Port 0 lets the

@@ -14,7 +14,7 @@ use serde_json::{Map, Value, json};
 use tickbus_base::toml_text::{Key, Shape, TableKind};
 use tickbus_driver_cfg::Kinds;
 use tickbus_driver_cfg::keys::{FIELDBUS, FILE, KindKeys, STATION, STATION_LIMIT};
-use tickbus_fieldbus::faults::FAULT_KINDS;
+use tickbus_fieldbus::faults::{FAULT_KINDS, FORMER_FAULT_KINDS};
 use tickbus_reply::{REPLY_KINDS, one_of};
 
 use shape::{described, table};
@@ -52,7 +52,17 @@ pub fn schema(kinds: &Kinds) -> Value {
         .iter()
         .map(|key| (key.name.to_owned(), described(key)))
         .collect();
-    properties["fault"]["items"]["allOf"] = rules_of(&FAULT_KINDS, |_| Vec::new());
+    let former = FORMER_FAULT_KINDS.iter().flat_map(|(before, name)| {
+        let kinds = FAULT_KINDS.into_iter().filter(|kind| kind.name == *name);
+        kinds.map(|kind| TableKind {
+            name: before,
+            ..kind
+        })
+    });
+    let faults: Vec<TableKind> = FAULT_KINDS.into_iter().chain(former).collect();
+    let fault = &mut properties["fault"]["items"];
+    fault["properties"]["kind"]["enum"] = faults.iter().map(|kind| kind.name).collect();
+    fault["allOf"] = rules_of(&faults, |_| Vec::new());
     let one_of_reply = |kind: &TableKind| {
         let groups = one_of(kind.name).iter();
         groups.map(|(keys, _)| keys.to_vec()).collect()

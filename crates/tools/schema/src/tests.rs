@@ -181,7 +181,7 @@ by = 1
 kind = "delay"
 by = "1s"
 [[fault]]
-kind = "slow-answers"
+kind = "values-late"
 by = "1s"
 [[fault]]
 kind = "duplicate"

@@ -24,7 +24,7 @@ pub enum Effect {
     /// Received frames are held back.
     Delay(Nanos),
     /// Sent frames are held back.
-    SlowAnswers(Nanos),
+    LateValues(Nanos),
     /// Frames of this direction are lost.
     Drop(&'static str),
     /// Frames of this direction come twice.
@@ -96,7 +96,7 @@ impl FaultPlan {
                 (_, 3) if signal == 0 => Effect::Invert(area),
                 (_, 3) => Effect::Offset(signal, area, by),
                 (_, 4) => Effect::Delay(held),
-                (_, 5) => Effect::SlowAnswers(held),
+                (_, 5) => Effect::LateValues(held),
                 (_, 6) => Effect::Drop(direction),
                 (_, 7) => Effect::Duplicate(direction),
                 _ => Effect::LinkDown,
@@ -138,7 +138,7 @@ impl FaultPlan {
     /// The time for which the fault holds frames back, in ns.
     pub(crate) fn held(&self) -> i64 {
         match self.effect {
-            Effect::Delay(by) | Effect::SlowAnswers(by) => by.0,
+            Effect::Delay(by) | Effect::LateValues(by) => by.0,
             _ => 0,
         }
     }
@@ -191,7 +191,7 @@ impl FaultPlan {
                 format!("kind = \"noise\"\nsignal = \"{name}\"\nchance = 0.5\n")
             }
             Effect::Delay(by) => format!("kind = \"delay\"\nby = \"{by}\"\n"),
-            Effect::SlowAnswers(by) => format!("kind = \"slow-answers\"\nby = \"{by}\"\n"),
+            Effect::LateValues(by) => format!("kind = \"values-late\"\nby = \"{by}\"\n"),
             Effect::Drop(direction) => {
                 format!("kind = \"drop\"\nchance = 0.3\ndirection = \"{direction}\"\n")
             }

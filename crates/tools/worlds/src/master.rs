@@ -97,6 +97,7 @@ impl Free for Master {
             baud: wire::BAUD,
             parity: Parity::Even,
             two_stop_bits: false,
+            seven_bits: false,
             rs485: false,
         };
         let mut call = Call::new(open_marking(DEVICE, settings, &**port.clock())?);

@@ -225,10 +225,47 @@ fn quantities_and_values_are_judged_before_addresses() {
 #[test]
 fn functions_that_are_not_there_are_illegal() {
     for code in 0..=u8::MAX {
-        if Function::of(code).is_none() || code == 17 {
+        if Function::of(code).is_none() || matches!(code, 7 | 8 | 11 | 12 | 17 | 20 | 21 | 24) {
             Unit::device().refuses(&[code, 0, 0, 0, 1], 1);
         }
     }
+}
+
+#[test]
+fn eight_bits_are_the_exception_status_where_the_device_has_them() {
+    let mut unit = Unit::device();
+    unit.map = map(Side::Sends, None).with_extras(Some((Table::DiscreteInputs, 8)), &[]);
+    let touched = unit.answers(&[7], &[7, 0x34]);
+    assert_eq!(touched, (vec![], vec![(8, 16)]));
+    unit.refuses(&[7, 0], 3);
+    // There are 24 bits.
+    for (first, is_there) in [(16, true), (17, false)] {
+        unit.map = map(Side::Sends, None).with_extras(Some((Table::DiscreteInputs, first)), &[]);
+        assert_eq!(unit.map.exception_status().is_some(), is_there);
+    }
+    unit.refuses(&[7], 1);
+}
+
+#[test]
+fn a_queue_is_a_register_that_counts_those_behind_it() {
+    let mut unit = Unit::device();
+    let queues = [0, 2, 9];
+    unit.map = map(Side::Sends, None).with_extras(None, &queues);
+    assert_eq!(unit.map.queues(), [0, 2], "there is no register 9");
+    unit.holds = [0, 2, 0x12, 0x34, 0x56, 0];
+    let answer = [24, 0, 6, 0, 2, 0x12, 0x34, 0x56, 0];
+    unit.answers(&[24, 0, 0], &answer);
+    unit.answers(&[24, 0, 0], &answer);
+    unit.holds = [0, 0, 0, 0, 0, 0];
+    unit.answers(&[24, 0, 0], &[24, 0, 2, 0, 0]);
+    unit.refuses(&[24, 0, 1], 2);
+    unit.refuses(&[24, 0], 3);
+    unit.refuses(&[24, 0, 0, 0], 3);
+    // More than a queue can have, and more than there are registers.
+    unit.holds = [0, 32, 0, 0, 0, 0];
+    unit.refuses(&[24, 0, 0], 3);
+    unit.holds = [0, 3, 0, 0, 0, 0];
+    unit.refuses(&[24, 0, 0], 2);
 }
 
 #[test]

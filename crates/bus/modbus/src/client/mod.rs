@@ -7,14 +7,17 @@ mod plan;
 mod request;
 mod session;
 
+use std::net::SocketAddr;
+use std::sync::Arc;
+
 use tickbus_base::time::{Nanos, Stop};
 use tickbus_fieldbus::WriteGuard;
 use tickbus_fieldbus::tcp::{Call, dial};
 use tickbus_fieldbus::{BusError, CYCLE, Free, Medium, Port, Role};
 use tickbus_image::signal::SignalTable;
-use tickbus_net::serial;
+use tickbus_net::{Address, Datagrams, serial};
 
-use super::Line;
+use super::{Coding, Line};
 pub use area_mapping::Block;
 pub(crate) use area_mapping::{PART_KEYS, PARTS};
 pub use options::ClientOptions;
@@ -84,6 +87,22 @@ impl ModbusClient {
     }
 }
 
+/// Opens a socket for datagrams to `address` and from there; `None` if `stop` came first.
+fn connect(
+    address: &Address,
+    port: &mut Port,
+    stop: &Stop,
+) -> Result<Option<(Datagrams, SocketAddr)>, BusError> {
+    port.opening(&format!("looking for {address}"));
+    let clock = Arc::clone(port.clock());
+    let Some((stream, peer)) = Datagrams::connect(address, &*clock, stop)? else {
+        return Ok(None);
+    };
+    port.tell("address", &peer.to_string());
+    port.opening(&format!("asking {peer}; waiting for its first answer"));
+    Ok(Some((stream, peer)))
+}
+
 impl Free for ModbusClient {
     fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
         let line = self.options.line.clone();
@@ -108,6 +127,18 @@ impl Free for ModbusClient {
                 let mut session = self.session(framing, peer.to_string(), port, port.clock().now());
                 call.run(&mut session, port, stop)
             }
+            Line::Udp(ref address) => {
+                let Some((stream, peer)) = connect(address, port, stop)? else {
+                    return Ok(());
+                };
+                let now = port.clock().now();
+                let framing = Framing::Udp {
+                    transaction: 0,
+                    again: now,
+                };
+                let mut session = self.session(framing, peer.to_string(), port, now);
+                Call::new(stream).run(&mut session, port, stop)
+            }
             Line::Serial(line) => {
                 let mut call = Call::new(serial::open(&line.device, line.settings)?);
                 port.carried_by(Medium::Serial {
@@ -116,11 +147,18 @@ impl Free for ModbusClient {
                 port.tell("device", &line.device);
                 port.opening(&format!("asking on {}", line.device));
                 let now = port.clock().now();
-                let framing = Framing::Rtu {
+                let (character, silence) = match line.coding {
+                    Coding::Rtu => (crate::rtu::character(line.settings.baud), line.silence),
+                    // A colon begins a telegram, whatever was before it.
+                    Coding::Ascii => (line.settings.character(), Nanos::ZERO),
+                };
+                let framing = Framing::Serial {
+                    coding: line.coding,
                     inbox: Vec::new(),
-                    character: super::rtu::character(line.settings.baud),
-                    silence: line.silence,
-                    quiet_until: now + line.silence,
+                    ascii: crate::ascii::Framer::new(line.silence),
+                    character,
+                    silence,
+                    quiet_until: now + silence,
                     echo: line.new_echo(),
                 };
                 let mut session = self.session(framing, line.device, port, now);

@@ -201,7 +201,7 @@ impl ClientOptions {
     /// The capabilities assumed of a device at the start of a connection.
     pub(super) fn capabilities(&self) -> Capabilities {
         let gap = match self.line {
-            Line::Tcp(_) => usize::MAX,
+            Line::Tcp(_) | Line::Udp(_) => usize::MAX,
             Line::Serial(_) | Line::RtuOverTcp(_) => SERIAL_GAP,
         };
         Capabilities::new(self.combine, gap)

@@ -317,11 +317,21 @@ pub(super) fn length(beginning: &[u8]) -> Option<usize> {
         | Function::ReadHoldingRegisters
         | Function::ReadInputRegisters
         | Function::ReadWriteRegisters
-        | Function::ReportServerId => Some(2 + usize::from(*data.first()?)),
+        | Function::ReportServerId
+        | Function::CommEventLog
+        | Function::ReadFileRecord
+        | Function::WriteFileRecord => Some(2 + usize::from(*data.first()?)),
         Function::WriteCoil
         | Function::WriteRegister
         | Function::WriteCoils
-        | Function::WriteRegisters => Some(5),
+        | Function::WriteRegisters
+        | Function::Diagnostics
+        | Function::CommEventCounter => Some(5),
+        Function::ReadExceptionStatus => Some(2),
+        Function::ReadFifoQueue => {
+            let count = data.first_chunk::<2>()?;
+            Some(3 + usize::from(u16::from_be_bytes(*count)))
+        }
         Function::MaskWriteRegister => Some(7),
         Function::DeviceIdentification => identification::length(beginning),
     }

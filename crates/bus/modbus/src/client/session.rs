@@ -7,12 +7,10 @@ mod trouble;
 
 use std::fmt;
 use std::io;
-use std::ops::Range;
 
 use crate::function::EXCEPTION_BIT;
 use crate::mbap::{self, Telegram};
-use crate::rtu;
-use crate::{Function, Identification};
+use crate::{Coding, Function, Identification, ascii, rtu};
 use tickbus_base::time::{Nanos, Pace};
 use tickbus_fieldbus::WriteGuard;
 use tickbus_fieldbus::tcp::Caller;
@@ -23,6 +21,9 @@ use super::plan::Capabilities;
 use super::request::{AnswerError, length};
 use identify::Identity;
 pub(super) use station::Station;
+
+/// How often a request over UDP is sent, at equal intervals, until its time-out has passed.
+const TRIES: i64 = 4;
 
 /// The framing of telegrams.
 #[derive(Debug)]
@@ -39,12 +40,23 @@ pub(super) enum Framing {
         /// The received part of the next telegram.
         inbox: Vec<u8>,
     },
-    /// By their length, and by silence between them.
-    Rtu {
-        /// The received part of an answer.
+    /// One in each datagram, with the header of TCP.
+    Udp {
+        /// The last transaction number.
+        transaction: u16,
+        /// When the request goes out once more.
+        again: Nanos,
+    },
+    /// On a serial line: by their length, or as its characters delimit them.
+    Serial {
+        coding: Coding,
+        /// The received part of an answer, as RTU.
         inbox: Vec<u8>,
+        /// The same as ASCII.
+        ascii: ascii::Framer,
         /// Duration of one character.
         character: Nanos,
+        /// The silence before a request.
         silence: Nanos,
         /// Nothing may be sent before this.
         quiet_until: Nanos,
@@ -89,9 +101,9 @@ pub(super) struct ClientSession<'a> {
     /// When the session last checked for due work.
     looked: Nanos,
     asking: Option<Asking>,
-    /// The request in the line's format, the range of its PDU, and how much of it the system has accepted.
+    /// The PDU of the request, the request in the line's format, and how much of that the system has accepted.
+    pdu: Vec<u8>,
     request: Vec<u8>,
-    pdu: Range<usize>,
     written: usize,
     /// True if the line is reported as lost because no station works.
     lost: bool,
@@ -121,8 +133,8 @@ impl<'a> ClientSession<'a> {
             pace: Pace::new(now, cycle),
             looked: now,
             asking: None,
+            pdu: Vec::new(),
             request: Vec::new(),
-            pdu: 0..0,
             written: 0,
             lost: false,
         }
@@ -137,22 +149,23 @@ impl Caller for ClientSession<'_> {
         // While an answer is slow, wake up every cycle to check the age of the data.
         let deadline = asking.limit.min(self.looked + self.cycle);
         match self.framing {
-            Framing::Rtu { quiet_until, .. } if self.written < self.request.len() => {
+            Framing::Serial { quiet_until, .. } if self.written < self.request.len() => {
                 deadline.min(quiet_until)
             }
+            Framing::Udp { again, .. } => deadline.min(again),
             _ => deadline,
         }
     }
 
     fn to_write(&self, now: Nanos) -> &[u8] {
         match self.framing {
-            Framing::Rtu { quiet_until, .. } if now < quiet_until => &[],
+            Framing::Serial { quiet_until, .. } if now < quiet_until => &[],
             _ => &self.request[self.written..],
         }
     }
 
     fn wrote(&mut self, now: Nanos, count: usize, _port: &mut Port) {
-        if let Framing::Rtu {
+        if let Framing::Serial {
             echo: Some(echo), ..
         } = &mut self.framing
         {
@@ -166,7 +179,11 @@ impl Caller for ClientSession<'_> {
         match &self.asking {
             Some(asking) if now >= asking.limit => self.give_up(now, port),
             None if self.pace.take(now) && port.take_all(now).is_some() => self.begin(0, now, port),
-            _ => Ok(()),
+            Some(_) => {
+                self.repeat(now, port);
+                Ok(())
+            }
+            None => Ok(()),
         }
     }
 
@@ -187,13 +204,16 @@ impl Caller for ClientSession<'_> {
                 }
                 Ok(())
             }
-            Framing::Rtu {
+            Framing::Udp { .. } => self.datagram(bytes, now, port),
+            Framing::Serial {
+                coding,
                 inbox,
                 silence,
                 quiet_until,
                 echo,
                 ..
             } => {
+                let coding = *coding;
                 *quiet_until = now + *silence;
                 let bytes = match echo {
                     Some(echo) => {
@@ -205,6 +225,9 @@ impl Caller for ClientSession<'_> {
                 };
                 if bytes.is_empty() {
                     return Ok(());
+                }
+                if coding == Coding::Ascii {
+                    return self.characters(bytes, now, port);
                 }
                 let room = rtu::ADU_LIMIT - inbox.len();
                 inbox.extend_from_slice(&bytes[..bytes.len().min(room)]);
@@ -233,7 +256,7 @@ impl Caller for ClientSession<'_> {
         let asked_identity = self.hung_up();
         let peer = &self.peer;
         match self.framing {
-            Framing::Rtu { .. } => gone(peer, "it was closed").into(),
+            Framing::Serial { .. } => gone(peer, "it was closed").into(),
             _ if asked_identity => BusError::Left(format!(
                 "{peer} closed the connection when it was asked who it is (function 43); if it does so again, it is \
                  not asked for some time"
@@ -246,12 +269,15 @@ impl Caller for ClientSession<'_> {
 
     fn broke(&mut self, error: &io::Error) -> BusError {
         // A device is not blamed for a question that it has not received.
-        if self.written == self.request.len() {
+        if self.written == self.request.len() && !matches!(self.framing, Framing::Udp { .. }) {
             self.hung_up();
         }
         let peer = &self.peer;
         match self.framing {
-            Framing::Rtu { .. } => gone(peer, error).into(),
+            Framing::Serial { .. } => gone(peer, error).into(),
+            Framing::Udp { .. } => BusError::Link(format!(
+                "{peer} takes no datagrams ({error}); start the program that serves there, or correct \"address\""
+            )),
             _ => BusError::Link(format!(
                 "the connection with {peer} broke ({error}); see whether the server still runs"
             )),
@@ -260,10 +286,65 @@ impl Caller for ClientSession<'_> {
 }
 
 impl ClientSession<'_> {
-    /// An RTU telegram arrived over a serial line.
+    /// Sends the request once more, if the answer to a datagram is late.
+    fn repeat(&mut self, now: Nanos, port: &Port) {
+        if let Framing::Udp { again, .. } = &mut self.framing
+            && now >= *again
+            && self.written == self.request.len()
+        {
+            *again = now + Nanos(self.timeout.0 / TRIES);
+            self.written = 0;
+            port.count("modbus-client.repeated");
+        }
+    }
+
+    /// A datagram arrived: a telegram, or nothing of use.
+    fn datagram(&mut self, bytes: &[u8], now: Nanos, port: &mut Port) -> Result<(), BusError> {
+        let Ok(Some((telegram, length))) = Telegram::parse(bytes) else {
+            port.count("modbus-client.damaged");
+            return Ok(());
+        };
+        if length < bytes.len() {
+            port.count("modbus-client.damaged");
+            return Ok(());
+        }
+        self.read_telegram(telegram, now, port)
+    }
+
+    /// Characters of ASCII arrived.
+    fn characters(
+        &mut self,
+        mut characters: &[u8],
+        now: Nanos,
+        port: &mut Port,
+    ) -> Result<(), BusError> {
+        while !characters.is_empty() {
+            let Framing::Serial { ascii, .. } = &mut self.framing else {
+                return Ok(());
+            };
+            ascii.arrived(now, &mut characters);
+            let whole = ascii.take(now, |bytes| bytes.unwrap_or_default().to_vec());
+            let Some(telegram) = whole else {
+                continue;
+            };
+            if self.asking.is_none() {
+                port.count("modbus-client.unasked");
+                continue;
+            }
+            port.read_telegrams(1);
+            self.telegram(&telegram, now, port)?;
+        }
+        Ok(())
+    }
+
+    /// A telegram arrived over a serial line.
     fn telegram(&mut self, telegram: &[u8], now: Nanos, port: &mut Port) -> Result<(), BusError> {
         self.clear();
-        if let Some((from, pdu)) = rtu::parse(telegram) {
+        let coding = match &self.framing {
+            Framing::Serial { coding, .. } => *coding,
+            _ => Coding::Rtu,
+        };
+        if let Some((from, pdu)) = coding.parse(telegram) {
             return self.undamaged(from, pdu, now, port);
         }
         port.count("modbus-client.damaged");
@@ -332,7 +413,7 @@ impl ClientSession<'_> {
     }
 
     fn clear(&mut self) {
-        if let Framing::Rtu { inbox, .. } = &mut self.framing {
+        if let Framing::Serial { inbox, .. } = &mut self.framing {
             inbox.clear();
         }
     }
@@ -352,16 +433,27 @@ impl ClientSession<'_> {
                 Err(error) => return Err(self.violated(error)),
             };
             taken += length;
-            let Framing::Tcp { transaction, .. } = &self.framing else {
-                return Ok(taken);
-            };
-            if self.asking.is_none() || telegram.transaction != *transaction {
-                // Too late, or never requested.
-                port.count("modbus-client.unasked");
-                continue;
-            }
-            self.answered(telegram.pdu, now, port)?;
+            self.read_telegram(telegram, now, port)?;
         }
+    }
+
+    /// A telegram with the header of TCP arrived.
+    fn read_telegram(
+        &mut self,
+        telegram: Telegram<'_>,
+        now: Nanos,
+        port: &mut Port,
+    ) -> Result<(), BusError> {
+        let asked = match &self.framing {
+            Framing::Tcp { transaction, .. } | Framing::Udp { transaction, .. } => *transaction,
+            _ => return Ok(()),
+        };
+        if self.asking.is_none() || telegram.transaction != asked {
+            // Too late, repeated, or never requested.
+            port.count("modbus-client.unasked");
+            return Ok(());
+        }
+        self.answered(telegram.pdu, now, port)
     }
 
     /// The answer to the current request arrived.
@@ -374,9 +466,8 @@ impl ClientSession<'_> {
                 self.identified(station, so_far, requests, pdu, now, port)
             }
             Asked::Data(index) => {
-                let asked = &self.request[self.pdu.clone()];
                 let polled = &mut self.stations[station];
-                let taken = polled.queries[index].take(asked, pdu, &mut polled.receives);
+                let taken = polled.queries[index].take(&self.pdu, pdu, &mut polled.receives);
                 match taken {
                     Ok(()) => self.go_on(station, index + 1, now, port),
                     Err(AnswerError::Malformed(what)) => {
@@ -476,6 +567,10 @@ impl ClientSession<'_> {
         write: impl FnOnce(&Station, &mut Vec<u8>),
     ) {
         let polled = &self.stations[station];
+        self.pdu.clear();
+        write(polled, &mut self.pdu);
+        let pdu = &self.pdu;
+        let copy = |to: &mut Vec<u8>| to.extend_from_slice(pdu);
         let request = &mut self.request;
         request.clear();
         self.written = 0;
@@ -483,24 +578,28 @@ impl ClientSession<'_> {
         match &mut self.framing {
             Framing::Tcp { transaction, .. } => {
                 *transaction = transaction.wrapping_add(1);
-                mbap::append(*transaction, polled.unit, request, |pdu| write(polled, pdu));
-                self.pdu = mbap::HEADER..request.len();
+                mbap::append(*transaction, polled.unit, request, copy);
             }
-            Framing::RtuOverTcp { .. } => {
-                rtu::append(polled.unit, request, |pdu| write(polled, pdu));
-                self.pdu = 1..request.len() - rtu::CHECKSUM;
+            Framing::Udp { transaction, again } => {
+                *transaction = transaction.wrapping_add(1);
+                mbap::append(*transaction, polled.unit, request, copy);
+                *again = now + Nanos(self.timeout.0 / TRIES);
             }
-            Framing::Rtu {
+            Framing::RtuOverTcp { .. } => rtu::append(polled.unit, request, copy),
+            Framing::Serial {
+                coding,
                 inbox,
+                ascii,
                 character,
                 quiet_until,
                 ..
             } => {
                 inbox.clear();
-                rtu::append(polled.unit, request, |pdu| write(polled, pdu));
-                self.pdu = 1..request.len() - rtu::CHECKSUM;
-                // Request and answer need their time on the line, with unit and checksum.
-                let characters = i64::try_from(request.len() + answer + 3).unwrap_or(i64::MAX);
+                ascii.clear();
+                coding.append(polled.unit, request, copy);
+                // Request and answer need their time on the line.
+                let characters = request.len() + coding.characters(answer);
+                let characters = i64::try_from(characters).unwrap_or(i64::MAX);
                 limit = limit.max(*quiet_until + self.timeout) + character.times(characters);
             }
         }

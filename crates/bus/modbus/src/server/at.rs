@@ -2,6 +2,7 @@
 
 use crate::{Map, Piece, Side, TagAddress};
 use tickbus_base::Mistake;
+use tickbus_base::toml_text::Collector;
 use tickbus_fieldbus::At;
 use tickbus_image::signal::{Area, SignalTable};
 
@@ -127,8 +128,36 @@ impl ServerOptions {
         signals.any(|signal| signal.station == station && self.at.contains_key(&signal.name))
     }
 
-    /// The tables of a station.
+    /// The tables of a station, and what function 7 and 24 read of them.
     pub(super) fn map(&self, table: &SignalTable, station: usize) -> Map {
+        let status = self.exception_status;
+        let status = status.map(|(place, _)| (place.table, place.offset));
+        let queues: Vec<usize> = self.queues.iter().map(|(first, _)| *first).collect();
+        self.elements(table, station).with_extras(status, &queues)
+    }
+
+    /// Reports bits of function 7 and queues of function 24 that no station has.
+    pub(super) fn fit_extras(&self, table: &SignalTable, collector: &Collector<'_>) {
+        const RIGHT: &str = "name elements that `tickbus check` shows, or add them to [fieldbus.at] or \"reserved\"";
+        if self.exception_status.is_none() && self.queues.is_empty() {
+            return;
+        }
+        let stations = 0..table.stations.len();
+        let maps: Vec<Map> = stations.map(|station| self.map(table, station)).collect();
+        if let Some((_, at)) = self.exception_status
+            && maps.iter().all(|map| map.exception_status().is_none())
+        {
+            collector.report(at, "there are no eight elements from here on", RIGHT);
+        }
+        for (first, at) in &self.queues {
+            if maps.iter().all(|map| !map.queues().contains(first)) {
+                collector.report(*at, "there is no such register", RIGHT);
+            }
+        }
+    }
+
+    /// The elements of a station.
+    fn elements(&self, table: &SignalTable, station: usize) -> Map {
         if self.is_placed(table, station) {
             // Mistakes were reported when the driver.cfg was read.
             let signals = table.signals.iter();

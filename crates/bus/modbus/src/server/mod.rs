@@ -1,16 +1,21 @@
 //! The bus `modbus-server`: clients read and write the image.
 
 mod at;
+mod diagnostics;
+mod files;
 mod options;
 mod reserved;
 mod serial;
 mod tcp;
+mod udp;
 mod units;
 
 use tickbus_base::time::Stop;
 use tickbus_fieldbus::{BusError, BusSetup, Free, Medium, Port, tcp as many};
 
 use super::Line;
+pub(crate) use files::FILES;
+pub(crate) use options::QUEUES;
 pub use options::ServerOptions;
 pub(crate) use reserved::{RANGE_KEYS, RANGES};
 use tcp::TcpService;
@@ -45,6 +50,9 @@ impl Free for ModbusServer {
                 };
                 port.carried_by(Medium::Tcp);
                 many::serve(address, &mut service, port, stop)
+            }
+            Line::Udp(address) => {
+                udp::serve(address, &mut self.units, self.options.clients, port, stop)
             }
             Line::Serial(line) => serial::serve(line, &mut self.units, port, stop),
         }

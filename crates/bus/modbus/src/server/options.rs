@@ -13,11 +13,15 @@ use tickbus_image::signal::SignalTable;
 use tickbus_net::Address;
 
 use super::super::element_address::SHAPE;
+use super::files::read_files;
 use super::reserved::read_reserved;
 use crate::identity::read_identity;
 
 /// The default address: reachable only from this machine, at a port that needs no privilege.
 const ADDRESS: Address = Address::local(1502);
+
+/// The most queues of a device.
+pub(crate) const QUEUES: usize = 64;
 
 /// The default number of clients.
 const CLIENTS: usize = 1024;
@@ -41,6 +45,14 @@ pub struct ServerOptions {
     pub stations: Stations,
     /// The most clients at the same time.
     pub clients: usize,
+    /// The first of the eight coils or discrete inputs that function 7 reads, and the offset of that key.
+    pub exception_status: Option<(ElementAddress, usize)>,
+    /// The holding registers with which the queues of function 24 begin, and the offsets in the file.
+    pub queues: Vec<(usize, usize)>,
+    /// The numbers of the files of functions 20 and 21.
+    pub files: Vec<u16>,
+    /// If stated, whether the device has functions 8, 11 and 12.
+    diagnostics: Option<bool>,
     /// True if a client may not write data that another client has written recently.
     pub is_single_writer: bool,
 }
@@ -54,6 +66,10 @@ impl ServerOptions {
         let clients = table.take("clients");
         let reserved = table.take("reserved");
         let identity = table.take("identity");
+        let status = table.take("exception_status");
+        let queues = table.take("queues");
+        let files = table.take("files");
+        let diagnostics = table.take("diagnostics");
         let is_single_writer = Writers::read(table);
 
         let units = match &line {
@@ -73,6 +89,15 @@ impl ServerOptions {
                 .whole(1..=10_000)
                 .and_then(|clients| usize::try_from(clients).ok())
         });
+        let status = match &status {
+            None => Some(None),
+            Some(value) => read_status(value).map(|place| Some((place, value.at()))),
+        };
+        let queues = queues.as_ref().map_or(Some(Vec::new()), read_queues);
+        let files = files.as_ref().map_or(Some(Vec::new()), read_files);
+        let diagnostics = diagnostics
+            .as_ref()
+            .map_or(Some(None), |value| value.boolean().map(Some));
         let input = match role {
             Role::Device | Role::Observer => Side::Sends,
             Role::Controller => Side::Holds,
@@ -90,12 +115,22 @@ impl ServerOptions {
             reserved_at,
             stations,
             clients: clients?,
+            exception_status: status?,
+            queues: queues?,
+            files: files?,
+            diagnostics: diagnostics?,
             is_single_writer: is_single_writer?,
         })
     }
 }
 
 impl ServerOptions {
+    /// Returns true if the device has functions 8, 11 and 12, which the standard has for serial lines alone.
+    pub(super) fn has_diagnostics(&self) -> bool {
+        let usual = !matches!(self.line, Line::Tcp(_) | Line::Udp(_));
+        self.diagnostics.unwrap_or(usual)
+    }
+
     /// The holding register at which `%I` is repeated in a station whose `%Q` has this many bytes.
     pub(crate) fn window(&self, output_bytes: usize) -> Option<usize> {
         let outputs = table::Table::HoldingRegisters.elements(output_bytes);
@@ -117,6 +152,7 @@ impl ServerOptions {
                 "remove it: all elements of the image exist",
             );
         }
+        self.fit_extras(table, collector);
         let Some((first, at)) = self.window else {
             return;
         };
@@ -141,6 +177,45 @@ impl ServerOptions {
             );
         }
     }
+}
+
+/// Reads the first of the bits that function 7 reads.
+fn read_status(value: &Value<'_>) -> Option<ElementAddress> {
+    const RIGHT: &str =
+        "write the first of eight coils or discrete inputs, such as \"discrete-input:1\"";
+    let place = ElementAddress::parse(value.text(RIGHT)?, table::Table::DiscreteInputs);
+    let place = place.map_err(|mistake| value.refuse(mistake)).ok()?;
+    if !place.table.is_bits() {
+        let element = place.table.element();
+        value.wrong(format!("\"exception_status\" is a {element}"), RIGHT);
+        return None;
+    }
+    Some(place)
+}
+
+/// Reads the holding registers with which queues begin.
+fn read_queues(value: &Value<'_>) -> Option<Vec<(usize, usize)>> {
+    const RIGHT: &str = "write a list of holding registers, such as [\"400101\"]";
+    let list = value.list(RIGHT)?;
+    if list.len() > QUEUES {
+        value.wrong(
+            format!("it has {} queues", list.len()),
+            format!("write at most {QUEUES}"),
+        );
+        return None;
+    }
+    let read = list.iter().map(|value| {
+        let place = ElementAddress::parse(value.text(RIGHT)?, table::Table::HoldingRegisters);
+        let place = place.map_err(|mistake| value.refuse(mistake)).ok()?;
+        if place.table != table::Table::HoldingRegisters {
+            let element = place.table.element();
+            value.wrong(format!("a queue begins with a {element}"), RIGHT);
+            return None;
+        }
+        Some((place.offset, value.at()))
+    });
+    // All mistakes are reported, not only the first.
+    read.collect::<Vec<_>>().into_iter().collect()
 }
 
 /// Reads the holding register at which `%I` is repeated.

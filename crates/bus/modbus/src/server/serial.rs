@@ -2,9 +2,10 @@
 
 use std::io;
 
+use crate::coding::Framer;
 use crate::function::EXCEPTION_BIT;
 use crate::line::Serial;
-use crate::rtu::{self, Echo, Framer};
+use crate::rtu::Echo;
 use tickbus_base::time::{Nanos, Stop};
 use tickbus_fieldbus::tcp::{Call, Caller};
 use tickbus_fieldbus::{BusError, Medium, Port, Renewal};
@@ -41,7 +42,7 @@ pub(super) fn serve(
             writer: None,
         },
         units,
-        framer: Framer::new(line.silence),
+        framer: Framer::new(line.coding, line.silence),
         echo: line.new_echo(),
         suspicion: Suspicion::default(),
         reply: Vec::new(),
@@ -88,10 +89,12 @@ impl Server<'_> {
         } = self;
         framer.take(now, |telegram| {
             port.read_telegrams(1);
-            let Some((number, pdu)) = telegram.and_then(rtu::parse) else {
+            let Some((number, pdu)) = telegram.and_then(|telegram| line.coding.parse(telegram)) else {
                 port.count("modbus-server.damaged");
+                units.damaged(telegram.is_none());
                 return;
             };
+            units.heard();
             if !port.is_up(now) {
                 Renewal::lost_all(&mut source.renewals, now, port.max_age());
                 return;
@@ -101,7 +104,8 @@ impl Server<'_> {
                 port.count("modbus-server.answers_heard");
                 return;
             }
-            if suspicion.is_confirmed(telegram == Some(&reply[..])) {
+            let is_last_answer = telegram.is_some_and(|bytes| line.coding.is_of(reply, bytes));
+            if suspicion.is_confirmed(is_last_answer) {
                 port.log(
                     log::Level::Warn,
                     "echo",
@@ -127,11 +131,11 @@ impl Server<'_> {
                 port.count("modbus-server.unknown_unit");
                 return;
             };
-            *carried = rtu::append(number, reply, |reply| {
+            *carried = line.coding.append(number, reply, |reply| {
                 units.answer(station, now, pdu, source, reply, port)
             });
             if let Some(wrong) = port.take_wrong() {
-                rtu::spoil(reply, 0, wrong);
+                line.coding.spoil(reply, 0, wrong);
                 *carried = None;
             }
             *held_until = now + port.take_lateness();
@@ -147,7 +151,11 @@ impl Caller for Server<'_> {
         let own = self.echo.as_mut();
         let own = own.map_or(0, |echo| echo.strip(now, bytes));
         port.not_from_peer(own);
-        self.framer.arrived(now, &bytes[own..]);
+        let mut rest = &bytes[own..];
+        while !rest.is_empty() {
+            self.framer.arrived(now, &mut rest);
+            self.attend(now, port);
+        }
         Ok(())
     }
 

@@ -52,10 +52,14 @@ impl TcpService<'_> {
         port: &mut Port,
     ) -> Result<usize, BusError> {
         let split = rtu::split(bytes, answer::length);
-        let split = split.map_err(|error| BusError::Protocol(error.to_string()))?;
+        let split = split.map_err(|error| {
+            self.units.damaged(false);
+            BusError::Protocol(error.to_string())
+        })?;
         let Some((unit, pdu, length)) = split else {
             return Ok(0);
         };
+        self.units.heard();
         let source = &mut client.source;
         if unit == BROADCAST {
             self.units.broadcast(now, pdu, source, port);
@@ -113,10 +117,14 @@ impl Service for TcpService<'_> {
             return self.rtu_telegram(client, now, bytes, reply, port);
         }
         let parsed = Telegram::parse(bytes);
-        let parsed = parsed.map_err(|error| BusError::Protocol(error.to_string()))?;
+        let parsed = parsed.map_err(|error| {
+            self.units.damaged(false);
+            BusError::Protocol(error.to_string())
+        })?;
         let Some((telegram, length)) = parsed else {
             return Ok(0);
         };
+        self.units.heard();
         let Telegram {
             transaction,
             unit,

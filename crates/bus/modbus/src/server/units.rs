@@ -6,6 +6,8 @@ use tickbus_fieldbus::{BusSetup, Events, Port, Receipt, Renewal};
 use tickbus_image::signal::fail_safe_frame;
 
 use super::ServerOptions;
+use super::diagnostics::Diagnostics;
+use super::files::Files;
 use crate::table::{Span, Table};
 use crate::{Done, Exception, Function, Identification, Map, Side, Tables, answer, refuse};
 
@@ -36,6 +38,9 @@ struct Unit {
     /// True if any client has ever written.
     has_writer: bool,
     writers: Writers,
+    files: Files,
+    /// `None` for a device without functions 8, 11 and 12.
+    diagnostics: Option<Box<Diagnostics>>,
 }
 
 /// The source of requests.
@@ -75,11 +80,31 @@ impl ServedUnits {
                 generation: 0,
                 has_writer: false,
                 writers: Writers::new(options.is_single_writer),
+                files: Files::new(&options.files),
+                diagnostics: options.has_diagnostics().then(Box::default),
             }
         };
         Self {
             every_write: setup.events == Events::Writes,
             all: (0..table.stations.len()).map(unit).collect(),
+        }
+    }
+
+    /// An undamaged telegram was on the line, for any unit.
+    pub(super) fn heard(&mut self) {
+        for unit in &mut self.all {
+            if let Some(diagnostics) = &mut unit.diagnostics {
+                diagnostics.heard();
+            }
+        }
+    }
+
+    /// A damaged telegram was on the line; with `is_overlong` longer than any can be.
+    pub(super) fn damaged(&mut self, is_overlong: bool) {
+        for unit in &mut self.all {
+            if let Some(diagnostics) = &mut unit.diagnostics {
+                diagnostics.damaged(is_overlong);
+            }
         }
     }
 
@@ -107,17 +132,39 @@ impl ServedUnits {
     ) -> Option<Carried> {
         // A fault that begins meanwhile meets the whole request or nothing of it.
         port.together(|port| {
-            // A station that is cut off answers nothing, and no fault of an answer counts.
-            if port.is_station_up(station, now)
-                && let Some(code) = port.answer(station, pdu[0], now)
-            {
-                let exception = Exception(code);
-                refuse(pdu[0], exception, reply);
-                port.count(counted(exception));
+            // A station that is cut off hears and answers nothing, and no fault of an answer counts.
+            if !port.is_station_up(station, now) {
+                return self.carry_out(station, now, pdu, source, reply, port);
+            }
+            let begin = reply.len();
+            if !self.begin(station, pdu, false) {
                 return None;
             }
-            self.carry_out(station, now, pdu, source, reply, port)
+            let carried = match port.answer(station, pdu[0], now) {
+                Some(code) => {
+                    let exception = Exception(code);
+                    refuse(pdu[0], exception, reply);
+                    port.count(counted(exception));
+                    None
+                }
+                None => self.carry_out(station, now, pdu, source, reply, port),
+            };
+            self.end(station, pdu, &reply[begin..], false);
+            carried
         })
+    }
+
+    /// A station gets a request. Returns true if its unit does not only listen.
+    fn begin(&mut self, station: usize, pdu: &[u8], is_broadcast: bool) -> bool {
+        let diagnostics = self.all[station].diagnostics.as_mut();
+        diagnostics.is_none_or(|diagnostics| diagnostics.begin(pdu, is_broadcast))
+    }
+
+    /// A station has answered a request, with an empty `answer` if not at all.
+    fn end(&mut self, station: usize, pdu: &[u8], answer: &[u8], is_broadcast: bool) {
+        if let Some(diagnostics) = &mut self.all[station].diagnostics {
+            diagnostics.end(pdu, answer, is_broadcast);
+        }
     }
 
     fn carry_out(
@@ -130,7 +177,8 @@ impl ServedUnits {
         port: &mut Port,
     ) -> Option<Carried> {
         let unit = &mut self.all[station];
-        let writes_only = Function::of(pdu[0])
+        let function = Function::of(pdu[0]);
+        let writes_only = function
             .is_some_and(|function| function.writes() && function != Function::ReadWriteRegisters);
         // A station that is cut off hears and answers nothing, as if its client were silent.
         if !port.is_station_up(station, now) {
@@ -153,16 +201,19 @@ impl ServedUnits {
         let before = reply.len();
         // Only refused writes are undone.
         let held = unit.writers.is_single().then(|| unit.holds.clone());
-        let mut tables = Tables {
-            map: &unit.map,
-            sends: &unit.shown,
-            holds: &mut unit.holds,
-        };
+        let own = function.and_then(|function| unit.answer(function, pdu, reply));
         let Done {
             wrote,
             read,
             refused,
-        } = answer(pdu, &mut tables, &unit.identification, reply);
+        } = own.unwrap_or_else(|| {
+            let mut tables = Tables {
+                map: &unit.map,
+                sends: &unit.shown,
+                holds: &mut unit.holds,
+            };
+            answer(pdu, &mut tables, &unit.identification, reply)
+        });
         if is_lost {
             reply.truncate(before);
         }
@@ -230,7 +281,15 @@ impl ServedUnits {
         let mut nobody_hears = Vec::new();
         port.together(|port| {
             for station in 0..self.len() {
+                nobody_hears.clear();
+                let is_up = port.is_station_up(station, now);
+                if is_up && !self.begin(station, pdu, true) {
+                    continue;
+                }
                 self.carry_out(station, now, pdu, source, &mut nobody_hears, port);
+                if is_up {
+                    self.end(station, pdu, &nobody_hears, true);
+                }
             }
         });
         true
@@ -245,6 +304,38 @@ impl ServedUnits {
                 port.sent(&carried.receipt.bits(carried.station, bits));
             }
         }
+    }
+}
+
+impl Unit {
+    /// Answers a request of a function that needs more than the tables; `None` for the other functions, and those that the
+    /// device does not have.
+    fn answer(&mut self, function: Function, pdu: &[u8], reply: &mut Vec<u8>) -> Option<Done> {
+        let begin = reply.len();
+        reply.push(pdu[0]);
+        let data = &pdu[1..];
+        let answered = match (function, &mut self.diagnostics) {
+            (
+                Function::Diagnostics | Function::CommEventCounter | Function::CommEventLog,
+                Some(diagnostics),
+            ) => diagnostics.answer(function, data, reply),
+            (Function::ReadFileRecord | Function::WriteFileRecord, _) => {
+                self.files.answer(function, data, reply)
+            }
+            _ => {
+                reply.truncate(begin);
+                return None;
+            }
+        };
+        let refused = answered.err();
+        if let Some(exception) = refused {
+            reply.truncate(begin);
+            refuse(pdu[0], exception, reply);
+        }
+        Some(Done {
+            refused,
+            ..Done::default()
+        })
     }
 }
 

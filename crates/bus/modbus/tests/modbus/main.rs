@@ -236,7 +236,7 @@ fn suffer(device: &mut Alone, fault: &str) {
 #[test]
 fn a_pulse_in_slow_answers_is_held_until_a_client_has_read_it() {
     let (mut device, mut stream) = device("");
-    suffer(&mut device, "kind = \"slow-answers\"\nby = \"20ms\"");
+    suffer(&mut device, "kind = \"values-late\"\nby = \"20ms\"");
     for level in [1.0, 0.0] {
         device.end.set("sensor", level);
         device.end.tick();

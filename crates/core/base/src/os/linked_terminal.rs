@@ -94,6 +94,7 @@ mod tests {
         baud: 9600,
         parity: Parity::None,
         two_stop_bits: false,
+        seven_bits: false,
         rs485: false,
     };
 

@@ -82,6 +82,7 @@ macro_rules! of_the_system {
 of_the_system! {
     std::net::TcpStream,
     std::net::TcpListener,
+    std::net::UdpSocket,
     #[cfg(unix)]
     std::os::unix::net::UnixStream,
     super::SerialPort,

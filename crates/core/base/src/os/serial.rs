@@ -15,7 +15,7 @@ pub enum Parity {
     None,
 }
 
-/// Settings of a serial port; always eight data bits and no flow control.
+/// Settings of a serial port; never with flow control.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct SerialSettings {
     /// Bits per second.
@@ -24,14 +24,17 @@ pub struct SerialSettings {
     pub parity: Parity,
     /// Two stop bits instead of one.
     pub two_stop_bits: bool,
+    /// Seven data bits instead of eight.
+    pub seven_bits: bool,
     /// RTS switches the transceiver of an RS-485 line to sending while the port sends.
     pub rs485: bool,
 }
 
 impl SerialSettings {
-    /// The time of one character on the line: a start bit, eight data bits, the parity bit if there is one, the stop bits.
+    /// The time of one character on the line: a start bit, the data bits, the parity bit if there is one, the stop bits.
     pub fn character(&self) -> Nanos {
-        let bits = 10 + i64::from(self.parity != Parity::None) + i64::from(self.two_stop_bits);
+        let bits = 10 + i64::from(self.parity != Parity::None) + i64::from(self.two_stop_bits)
+            - i64::from(self.seven_bits);
         Nanos(bits * 1_000_000_000 / i64::from(self.baud.max(1)))
     }
 }
@@ -44,7 +47,8 @@ impl fmt::Display for SerialSettings {
             Parity::None => 'N',
         };
         let stop_bits = if self.two_stop_bits { 2 } else { 1 };
-        write!(f, "{} baud, 8{parity}{stop_bits}", self.baud)?;
+        let data_bits = if self.seven_bits { 7 } else { 8 };
+        write!(f, "{} baud, {data_bits}{parity}{stop_bits}", self.baud)?;
         f.write_str(if self.rs485 { ", RS-485" } else { "" })
     }
 }

@@ -10,6 +10,9 @@ use tickbus_image::signal::{DataType, Signal, SignalTable, Slot};
 /// The kind of a fault that the simulation's model has, as a driver.cfg names it.
 pub(super) const MODEL: &str = "model";
 
+/// The kind of fault that holds back sent values.
+pub(super) const LATE_VALUES: &str = "values-late";
+
 /// One fault, as a `[[fault]]` section describes it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fault {
@@ -59,7 +62,7 @@ pub enum LineEffect {
     /// Incoming frames are held back for this long.
     Delay(Nanos),
     /// Outgoing frames are held back for this long.
-    SlowAnswers(Nanos),
+    LateValues(Nanos),
     /// The frames of a cycle are lost with this probability.
     Drop(f64, Direction),
     /// The frames of a cycle are repeated with this probability.
@@ -146,7 +149,7 @@ impl Fault {
             Effect::Signal(_, SignalEffect::Offset(_)) => "offset",
             Effect::Signal(_, SignalEffect::Noise(_) | SignalEffect::Flicker(_)) => "noise",
             Effect::Line(LineEffect::Delay(_)) => "delay",
-            Effect::Line(LineEffect::SlowAnswers(_)) => "slow-answers",
+            Effect::Line(LineEffect::LateValues(_)) => LATE_VALUES,
             Effect::Line(LineEffect::Drop(..)) => "drop",
             Effect::Line(LineEffect::Duplicate(..)) => "duplicate",
             Effect::Line(LineEffect::LinkDown) => "link-down",
@@ -214,7 +217,7 @@ fn troubled(trouble: LineEffect, table: &SignalTable) -> String {
     };
     match trouble {
         LineEffect::Delay(by) => format!("what comes in is {by} late"),
-        LineEffect::SlowAnswers(by) => format!("what goes out is {by} late"),
+        LineEffect::LateValues(by) => format!("what goes out is {by} late"),
         LineEffect::Drop(chance, direction) => {
             let chance = short_number(chance);
             format!("{} are lost with a chance of {chance}", frames(direction))

@@ -150,7 +150,7 @@ impl LineFaults {
                 LineEffect::Delay(_) => {
                     wire.waiting.get_or_insert_with(|| Ring::new(wire.rx_len));
                 }
-                LineEffect::SlowAnswers(_) => {
+                LineEffect::LateValues(_) => {
                     let size = wire.out.current.len();
                     wire.out.waiting.get_or_insert_with(|| Ring::new(size));
                 }
@@ -194,7 +194,7 @@ impl LineFaults {
             if phase == Phase::Active {
                 match fault.trouble {
                     LineEffect::Delay(by) => sum.delay += by,
-                    LineEffect::SlowAnswers(by) => sum.slow += by,
+                    LineEffect::LateValues(by) => sum.slow += by,
                     LineEffect::LinkDown => sum.down = true,
                     LineEffect::StationDown(station) => {
                         if let Some(wire) = self.stations.get_mut(station) {

@@ -36,7 +36,8 @@ pub use list::{Faults, Prepared, Retired, Slots};
 pub use notes::Note;
 pub use random::Random;
 pub use section::{
-    FAULT_KEYS, FAULT_KINDS, LIMIT, Scope, model_value, read_file, read_one, read_sections,
+    FAULT_KEYS, FAULT_KINDS, FORMER_FAULT_KINDS, LIMIT, Scope, model_value, read_file, read_one,
+    read_sections,
 };
 pub use tick_time::TickTime;
 

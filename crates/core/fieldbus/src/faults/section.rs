@@ -3,9 +3,11 @@
 mod effect;
 mod keys;
 
+use std::sync::Once;
+
 pub use self::effect::model_value;
 use self::effect::read_effect;
-pub use self::keys::{FAULT_KEYS, FAULT_KINDS};
+pub use self::keys::{FAULT_KEYS, FAULT_KINDS, FORMER_FAULT_KINDS};
 use super::{AnswerCodes, Begin, Condition, Effect, Fault, Lasts};
 use tickbus_base::toml_text::{Collector, Mistakes, Table, TableKind, Value, read_text, shown};
 use tickbus_image::signal::SignalTable;
@@ -292,13 +294,32 @@ fn read(mut section: Table<'_>, scope: Option<Scope<'_>>) -> Option<Fault> {
         (None, Effect::Signal(index, _)) => {
             format!("{} {}", fault.kind(), table?.signals[index].name)
         }
-        (None, Effect::Line(_) | Effect::Model(_)) => fault.kind().to_owned(),
+        // The statistics have the name as it was written.
+        (None, Effect::Line(_) | Effect::Model(_)) => {
+            let written = keys.kind.as_ref().and_then(Value::as_text);
+            written.unwrap_or(fault.kind()).to_owned()
+        }
     };
     Some(fault)
 }
 
 fn kind_of(value: &Value<'_>) -> Option<TableKind> {
     let kinds = FAULT_KINDS.map(|kind| (kind.name, kind));
+    let former = FORMER_FAULT_KINDS.iter();
+    let mut former = former.filter(|(before, _)| value.as_text() == Some(before));
+    if let Some((before, name)) = former.next() {
+        static REPORTED: Once = Once::new();
+        REPORTED.call_once(|| {
+            log::warn!(
+                "the kind of fault \"{before}\" is called \"{name}\" now; change it in the file, since a later version \
+                 does not know the old name"
+            );
+        });
+        let mut kinds = kinds.iter();
+        return kinds
+            .find(|(known, _)| known == name)
+            .map(|(_, kind)| *kind);
+    }
     value.choice("kinds of faults", &kinds)
 }
 

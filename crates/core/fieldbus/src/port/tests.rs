@@ -399,7 +399,7 @@ fn a_peer_has_the_last_values_when_no_fault_keeps_them_from_it() {
         bytes
     };
     for effect in [
-        LineEffect::SlowAnswers(Nanos(20)),
+        LineEffect::LateValues(Nanos(20)),
         LineEffect::Duplicate(1.0, Direction::Out),
     ] {
         let mut rig = Rig::new();

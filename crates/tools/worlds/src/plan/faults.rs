@@ -55,7 +55,7 @@ impl Plan {
     /// a second, and for as long as the pulse is held.
     pub(crate) fn waits_for_pulses(&self) -> i64 {
         let faults = self.features.faults.iter();
-        let slow = faults.filter(|fault| matches!(fault.effect, Effect::SlowAnswers(_)));
+        let slow = faults.filter(|fault| matches!(fault.effect, Effect::LateValues(_)));
         i64::try_from(slow.count()).expect("few") * (1_000_000_000 + self.hold.0)
     }
 

@@ -124,6 +124,7 @@ impl Line {
             baud: 9600,
             parity: Parity::None,
             two_stop_bits: false,
+            seven_bits: false,
             rs485: false,
         };
         let mut port = None;

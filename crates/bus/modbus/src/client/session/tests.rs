@@ -1,3 +1,4 @@
+mod datagrams;
 mod stream;
 
 use std::sync::Arc;
@@ -117,13 +118,26 @@ impl Client {
 }
 
 fn serial() -> Framing {
-    Framing::Rtu {
+    Framing::Serial {
+        coding: Coding::Rtu,
+        ascii: ascii::Framer::new(ascii::SILENCE),
         inbox: Vec::new(),
         character: Nanos(1),
         silence: Nanos(1),
         quiet_until: Nanos::ZERO,
         echo: None,
     }
+}
+
+/// Unit and PDU of a telegram in ASCII.
+#[track_caller]
+fn of_characters(mut characters: &[u8]) -> (u8, Vec<u8>) {
+    let mut framer = ascii::Framer::new(ascii::SILENCE);
+    framer.arrived(Nanos::ZERO, &mut characters);
+    let bytes = framer.take(Nanos::ZERO, |bytes| bytes.map(<[u8]>::to_vec));
+    let bytes = bytes.expect("a whole one").expect("of usual length");
+    let (unit, pdu) = ascii::parse(&bytes).expect("undamaged");
+    (unit, pdu.to_vec())
 }
 
 fn tcp() -> Framing {
@@ -161,11 +175,18 @@ impl Line<'_> {
             if !telegram.is_empty() {
                 self.poll.wrote(self.now, telegram.len(), self.port);
                 return match self.poll.framing {
-                    Framing::Rtu { .. } | Framing::RtuOverTcp { .. } => {
+                    Framing::Serial {
+                        coding: Coding::Ascii,
+                        ..
+                    } => {
+                        let (unit, pdu) = of_characters(&telegram);
+                        (unit, pdu)
+                    }
+                    Framing::Serial { .. } | Framing::RtuOverTcp { .. } => {
                         let (unit, pdu) = rtu::parse(&telegram).expect("a telegram");
                         (unit, pdu.to_vec())
                     }
-                    Framing::Tcp { .. } => {
+                    Framing::Tcp { .. } | Framing::Udp { .. } => {
                         let parsed = Telegram::parse(&telegram).expect("a telegram");
                         let (telegram, _) = parsed.expect("a whole one");
                         self.transaction = telegram.transaction;
@@ -188,10 +209,14 @@ impl Line<'_> {
     fn answer_as(&mut self, unit: u8, pdu: &[u8]) {
         let mut telegram = Vec::new();
         match self.poll.framing {
-            Framing::Rtu { .. } | Framing::RtuOverTcp { .. } => {
+            Framing::Serial {
+                coding: Coding::Ascii,
+                ..
+            } => ascii::append(unit, &mut telegram, |bytes| bytes.extend_from_slice(pdu)),
+            Framing::Serial { .. } | Framing::RtuOverTcp { .. } => {
                 rtu::append(unit, &mut telegram, |bytes| bytes.extend_from_slice(pdu));
             }
-            Framing::Tcp { .. } => {
+            Framing::Tcp { .. } | Framing::Udp { .. } => {
                 let transaction = self.transaction;
                 mbap::append(transaction, unit, &mut telegram, |bytes| {
                     bytes.extend_from_slice(pdu);
@@ -550,7 +575,7 @@ fn a_device_that_cannot_mask_is_read_and_gets_all_but_the_bits() {
 fn the_echo_of_a_request_is_not_its_answer() {
     let mut client = Client::new(1, &[register(5)], &[register(0)], Some(FALLBACK));
     let mut framing = serial();
-    if let Framing::Rtu { echo, .. } = &mut framing {
+    if let Framing::Serial { echo, .. } = &mut framing {
         *echo = Some(rtu::Echo::new(9_600));
     }
     let mut line = client.connect(framing);
@@ -641,7 +666,7 @@ fn a_device_whose_answers_cannot_be_understood_is_asked_who_it_is_until_one_can(
             while line.asked() == READ {
                 line.answer(&[3, 2, 0, 7]);
             }
-            if matches!(line.poll.framing, Framing::Rtu { .. }) {
+            if matches!(line.poll.framing, Framing::Serial { .. }) {
                 line.hear(&[1, 0xAB, 1, 0, 0]).expect("it goes on");
             } else {
                 line.answer(&[43, READ_DEVICE_IDENTIFICATION, 1, 0x81, 0, 0, 1, 0]);

@@ -75,7 +75,7 @@ impl ClientSession<'_> {
         let rest = REST.times(trouble.rest);
         let mut stations = self.stations.iter();
         if stations.all(|polled| polled.trouble.kind == Some(Kind::Silent)) {
-            if !matches!(self.framing, Framing::Rtu { .. }) {
+            if !matches!(self.framing, Framing::Serial { .. }) {
                 return Err(error);
             }
             // All stations are silent, so none keeps another waiting; retry them at once to notice a repaired line.

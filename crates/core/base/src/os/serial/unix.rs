@@ -64,7 +64,12 @@ impl SerialPort {
             | ControlModes::PARODD
             | ControlModes::CSTOPB
             | ControlModes::CRTSCTS;
-        *control |= ControlModes::CS8 | ControlModes::CREAD | ControlModes::CLOCAL;
+        *control |= ControlModes::CREAD | ControlModes::CLOCAL;
+        *control |= if settings.seven_bits {
+            ControlModes::CS7
+        } else {
+            ControlModes::CS8
+        };
         *control |= match settings.parity {
             Parity::Even => ControlModes::PARENB,
             Parity::Odd => ControlModes::PARENB | ControlModes::PARODD,
@@ -270,6 +275,7 @@ mod tests {
         baud: 9600,
         parity: Parity::None,
         two_stop_bits: false,
+        seven_bits: false,
         rs485: false,
     };
 
@@ -336,6 +342,7 @@ mod tests {
             baud: 19_200,
             parity: Parity::Even,
             two_stop_bits: false,
+            seven_bits: false,
             rs485: false,
         };
         let far = rustix::pty::openpt(rustix::pty::OpenptFlags::RDWR).expect("a pseudo-terminal");

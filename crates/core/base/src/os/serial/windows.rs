@@ -65,7 +65,11 @@ impl SerialPort {
         let apply = |mut applied: serial2::Settings| {
             applied.set_raw();
             applied.set_baud_rate(settings.baud)?;
-            applied.set_char_size(CharSize::Bits8);
+            applied.set_char_size(if settings.seven_bits {
+                CharSize::Bits7
+            } else {
+                CharSize::Bits8
+            });
             applied.set_flow_control(FlowControl::None);
             applied.set_parity(match settings.parity {
                 Parity::Even => serial2::Parity::Even,

@@ -29,7 +29,7 @@ pub(super) struct Outgoing {
     held_up: Option<Nanos>,
     /// Changes that are held back.
     pub(super) waiting: Option<Ring>,
-    /// When the bus last took or repeated an image. `slow-answers` does not hold back the next image after a link was
+    /// When the bus last took or repeated an image. `values-late` does not hold back the next image after a link was
     /// down, on a new connection, or after a pause of more than [`PATIENCE`] such as after a lost request: the outage
     /// has delayed that image already.
     pub(super) taken: Taken,

@@ -180,7 +180,7 @@ fn a_delay_that_holds_more_than_fits_hands_the_oldest_in_early_and_says_so() {
 fn slow_answers_send_what_was_true_before() {
     let mut rig = Rig::new();
     assert_eq!(rig.send(0, [0, 1], true), ([0, 1], true));
-    let slow = rig.add(LineEffect::SlowAnswers(Nanos(20)), 1);
+    let slow = rig.add(LineEffect::LateValues(Nanos(20)), 1);
     assert_eq!(rig.send(10, [0, 2], true), ([0, 1], true));
     assert_eq!(rig.send(20, [0, 3], true), ([0, 1], true));
     assert_eq!(rig.send(30, [0, 4], true), ([0, 2], true));
@@ -193,7 +193,7 @@ fn slow_answers_send_what_was_true_before() {
 #[test]
 fn what_waited_for_a_link_is_not_held_back_again_and_nothing_of_before_is_repeated() {
     let mut rig = Rig::new();
-    rig.add(LineEffect::SlowAnswers(Nanos(20)), 1);
+    rig.add(LineEffect::LateValues(Nanos(20)), 1);
     assert_eq!(rig.send(0, [0, 1], true).0, [0, 0]);
     assert_eq!(rig.send(20, [0, 2], true).0, [0, 1]);
     let down = rig.add(LineEffect::LinkDown, 1);
@@ -206,7 +206,7 @@ fn what_waited_for_a_link_is_not_held_back_again_and_nothing_of_before_is_repeat
     assert_eq!(rig.send(later + 1, [0, 81], true).0, [0, 80]);
 
     let mut rig = Rig::new();
-    rig.add(LineEffect::SlowAnswers(Nanos(20)), 1);
+    rig.add(LineEffect::LateValues(Nanos(20)), 1);
     rig.send(0, [1, 1], true);
     rig.send(1, [0, 2], true);
     let down = rig.add(LineEffect::LinkDown, 1);
@@ -234,7 +234,7 @@ fn what_waited_for_a_link_is_not_held_back_again_and_nothing_of_before_is_repeat
 fn the_first_fault_repeats_nothing_of_before_the_line_was_opened_and_nothing_that_is_old() {
     let first = |taken| {
         let mut rig = Rig::taken(1, taken);
-        rig.add(LineEffect::SlowAnswers(Nanos(20)), 1);
+        rig.add(LineEffect::LateValues(Nanos(20)), 1);
         rig.send(2 * PATIENCE.0, [0, 9], true).0
     };
     assert_eq!(first(Taken::Before), [0, 9]);
@@ -249,7 +249,7 @@ fn the_first_fault_repeats_nothing_of_before_the_line_was_opened_and_nothing_tha
 #[test]
 fn latched_bits_of_after_an_outage_are_as_young_as_the_values() {
     let mut rig = Rig::new();
-    rig.add(LineEffect::SlowAnswers(Nanos(20_000)), 1);
+    rig.add(LineEffect::LateValues(Nanos(20_000)), 1);
     rig.send(0, [0, 1], true);
     rig.send(1, [0, 2], true);
     let down = rig.add(LineEffect::LinkDown, 1);
@@ -260,7 +260,7 @@ fn latched_bits_of_after_an_outage_are_as_young_as_the_values() {
 #[test]
 fn a_held_pulse_outlives_a_station_that_is_cut_off() {
     let mut rig = Rig::new();
-    let slow = rig.add(LineEffect::SlowAnswers(Nanos(10)), 1);
+    let slow = rig.add(LineEffect::LateValues(Nanos(10)), 1);
     rig.send(0, [1, 1], false);
     rig.send(1, [0, 2], false);
     assert_eq!(rig.send(20, [0, 2], false).0, [1, 1]);
@@ -305,7 +305,7 @@ fn cycles_without_a_pause_are_repeated_for_as_long_as_the_fault_lasts() {
 #[test]
 fn a_pulse_that_waits_is_sent_though_its_fault_ends_and_values_are_true_at_once() {
     let mut rig = Rig::new();
-    let slow = rig.add(LineEffect::SlowAnswers(Nanos(20)), 1);
+    let slow = rig.add(LineEffect::LateValues(Nanos(20)), 1);
     for (now, level) in [(0, 1), (1, 0), (2, 1), (3, 0)] {
         assert_eq!(rig.send(now, [level, 7], true).0, [0, 0]);
     }
@@ -317,13 +317,13 @@ fn a_pulse_that_waits_is_sent_though_its_fault_ends_and_values_are_true_at_once(
 #[test]
 fn values_do_not_go_back_when_the_next_fault_begins_before_all_edges_were_shown() {
     let mut rig = Rig::new();
-    let slow = rig.add(LineEffect::SlowAnswers(Nanos(20)), 1);
+    let slow = rig.add(LineEffect::LateValues(Nanos(20)), 1);
     for now in 0..6_u8 {
         rig.send(now.into(), [now & 1, 1 + now], true);
     }
     rig.end(slow);
     assert_eq!(rig.send(6, [0, 7], true).0, [1, 7]);
-    rig.add(LineEffect::SlowAnswers(Nanos(20)), 1);
+    rig.add(LineEffect::LateValues(Nanos(20)), 1);
     let sent = (7..60).map(|now: u8| rig.send(now.into(), [0, 1 + now], true).0);
     let sent: Vec<[u8; 2]> = sent.collect();
     assert!(sent.is_sorted_by_key(|bytes| bytes[1]), "{sent:?}");
@@ -335,7 +335,7 @@ fn values_do_not_go_back_when_the_next_fault_begins_before_all_edges_were_shown(
 #[test]
 fn a_frame_that_the_peer_has_not_taken_keeps_its_pulse() {
     let mut rig = Rig::new();
-    rig.add(LineEffect::SlowAnswers(Nanos(10)), 1);
+    rig.add(LineEffect::LateValues(Nanos(10)), 1);
     rig.send(0, [1, 0], false);
     rig.send(1, [0, 0], false);
     for now in 20..25 {
@@ -348,7 +348,7 @@ fn a_frame_that_the_peer_has_not_taken_keeps_its_pulse() {
 #[test]
 fn a_pulse_waits_for_the_peer_that_reads_other_bits_only() {
     let mut rig = Rig::new();
-    rig.add(LineEffect::SlowAnswers(Nanos(10)), 1);
+    rig.add(LineEffect::LateValues(Nanos(10)), 1);
     rig.send(0, [1, 5], false);
     rig.send(1, [0, 6], false);
     for bits in [8..16, 1..8] {
@@ -363,7 +363,7 @@ fn a_pulse_waits_for_the_peer_that_reads_other_bits_only() {
 #[test]
 fn a_pulse_that_the_peer_never_reads_holds_up_what_it_reads_once_and_not_for_ever() {
     let mut rig = Rig::new();
-    let slow = rig.add(LineEffect::SlowAnswers(Nanos(10)), 1);
+    let slow = rig.add(LineEffect::LateValues(Nanos(10)), 1);
     rig.send(0, [1, 5], false);
     rig.send(1, [0, 6], false);
     assert_eq!(rig.send(20, [0, 6], false).0, [1, 5]);
@@ -381,7 +381,7 @@ fn a_pulse_that_the_peer_never_reads_holds_up_what_it_reads_once_and_not_for_eve
     assert_eq!(rig.send(after + 21, [1, 9], false), ([1, 9], false));
     // Once the peer has read the bit, pulses of that bit wait for the peer again.
     rig.wires.sent(0, Some(&(0..1)));
-    rig.add(LineEffect::SlowAnswers(Nanos(10)), 1);
+    rig.add(LineEffect::LateValues(Nanos(10)), 1);
     rig.send(after + 30, [0, 0], false);
     rig.send(after + 31, [1, 0], false);
     assert_eq!(rig.send(after + 50, [1, 0], false).0, [0, 0]);
@@ -512,7 +512,7 @@ proptest! {
         for (pause, level, taken, what) in levels {
             now += pause;
             match (what, slow) {
-                (0, None) => slow = Some(rig.add(LineEffect::SlowAnswers(Nanos(50)), 1)),
+                (0, None) => slow = Some(rig.add(LineEffect::LateValues(Nanos(50)), 1)),
                 (1, Some(id)) => {
                     rig.end(id);
                     slow = None;

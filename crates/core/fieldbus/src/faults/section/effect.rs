@@ -4,7 +4,7 @@ use super::keys::{DIAGNOSIS_LIMIT, DIRECTIONS, SIGNAL};
 use super::{Keys, Scope};
 use crate::faults::condition::unknown;
 use crate::faults::diagnosis::OCTET_LIMIT;
-use crate::faults::fault::MODEL;
+use crate::faults::fault::{LATE_VALUES, MODEL};
 use crate::faults::{
     AnswerCodes, AnswerEffect, AnswerTrouble, ChannelError, Diagnosis, Direction, Effect, Finding,
     LineEffect, Octets, SignalEffect, WrongAnswer, measure,
@@ -29,7 +29,7 @@ pub(super) fn read_effect(
     let line = |trouble| Some(Effect::Line(trouble));
     match kind {
         "delay" => line(LineEffect::Delay(read_hold(keys)?)),
-        "slow-answers" => line(LineEffect::SlowAnswers(read_hold(keys)?)),
+        LATE_VALUES => line(LineEffect::LateValues(read_hold(keys)?)),
         "drop" => {
             let (chance, direction) = (read_chance(keys, None), read_direction(keys));
             line(LineEffect::Drop(chance?, direction?))

@@ -6,7 +6,7 @@ use tickbus_image::signal::section::NAME_LIMIT;
 use super::super::Direction;
 use super::super::answer::WrongAnswer;
 use super::super::diagnosis::{ChannelError, OCTET_LIMIT};
-use super::super::fault::MODEL;
+use super::super::fault::{LATE_VALUES, MODEL};
 
 const fn kind(
     name: &'static str,
@@ -40,6 +40,9 @@ const CODES: Shape = Shape::Any(&[Shape::Whole(1, u32::MAX as i128), Shape::Text
 /// Which answers are wrong.
 const OF_ANSWERS: &[&str] = &["chance", "station", "function", "seed"];
 
+/// Earlier names of kinds, each with the name of today: accepted, and logged once.
+pub const FORMER_FAULT_KINDS: [(&str, &str); 1] = [("slow-answers", LATE_VALUES)];
+
 /// The kinds of faults.
 pub const FAULT_KINDS: [TableKind; 15] = [
     kind("stuck", &[OF_SIGNAL], &["value"]),
@@ -54,7 +57,7 @@ pub const FAULT_KINDS: [TableKind; 15] = [
     ),
     kind("noise", &[OF_SIGNAL], &["amplitude", "chance", "seed"]),
     kind("delay", &[BY_TIME], &[]),
-    kind("slow-answers", &[BY_TIME], &[]),
+    kind(LATE_VALUES, &[BY_TIME], &[]),
     kind(
         "drop",
         &[key(
@@ -133,7 +136,7 @@ pub const FAULT_KEYS: &[Key] = &[
     Key::new(
         "by",
         QUANTITY,
-        "offset: what is added; delay, slow-answers and answer-late: a duration, at most 60s",
+        "offset: what is added; delay, values-late and answer-late: a duration, at most 60s",
     ),
     Key::new(
         "amplitude",

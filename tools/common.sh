@@ -60,7 +60,7 @@ at_least() {
 
 # The zip's features beyond a plain build. Not all, since the zip has a limit (tools/dist-check).
 # shellcheck disable=SC2034 # for the scripts that source this
-PRODUCT_FEATURES=opcua,page,mqtt
+PRODUCT_FEATURES=opcua,page,mqtt,modbus-tls
 
 # Has the linker keep one copy of identical functions, of which OPC UA has thousands, where it can (Rust's own does on
 # Linux): library and command become smaller by a twentieth. Used in every build of the product, so that none is rebuilt.

@@ -1,4 +1,4 @@
-//! The server's half of the Modbus codec: any stream of TCP or RTU telegrams against the tables of one unit.
+//! The server's half of the Modbus codec: any stream of TCP, RTU or ASCII telegrams against the tables of one unit.
 //!
 //! The first bytes choose role, window and sizes; the rest is the stream.
 
@@ -7,7 +7,7 @@
 use libfuzzer_sys::fuzz_target;
 use tickbus_bus_modbus::mbap::Telegram;
 use tickbus_bus_modbus::{
-    Done, Function, Identification, Map, PDU_LIMIT, Side, Tables, answer, rtu,
+    Done, Function, Identification, Map, PDU_LIMIT, Side, Table, Tables, answer, ascii, rtu,
 };
 use tickbus_base::time::Nanos;
 
@@ -23,7 +23,10 @@ fuzz_target!(|data: &[u8]| {
     };
     let window = (flags & 2 != 0).then_some(usize::from(window) * 128);
     let holds_len = usize::from(holds) * if flags & 4 == 0 { 1 } else { 257 };
-    let map = Map::of_areas(input, window, sends.into(), holds_len);
+    let mut map = Map::of_areas(input, window, sends.into(), holds_len);
+    if flags & 32 != 0 {
+        map = map.with_extras(Some((Table::DiscreteInputs, sends.into())), &[0, 1, holds.into()]);
+    }
     let mut unit = Unit {
         map,
         sends: (0..sends).collect(),
@@ -31,6 +34,8 @@ fuzz_target!(|data: &[u8]| {
     };
     if flags & 8 == 0 {
         tcp(&mut unit, stream);
+    } else if flags & 16 != 0 {
+        characters(&mut unit, stream);
     } else {
         serial(&mut unit, stream);
     }
@@ -94,6 +99,41 @@ fn tcp(unit: &mut Unit, mut stream: &[u8]) {
         assert!(length <= stream.len() && !telegram.pdu.is_empty());
         unit.ask(telegram.pdu);
         stream = &stream[length..];
+    }
+}
+
+/// Pieces of the stream as ASCII, each preceded by its length and the pause before it; long ones are also tried as the
+/// bytes of a telegram, whose digits and checksum a fuzzer cannot guess.
+fn characters(unit: &mut Unit, mut stream: &[u8]) {
+    let mut framer = ascii::Framer::new(Nanos(16));
+    let mut now = Nanos::ZERO;
+    while let [pause, length, rest @ ..] = stream {
+        now = now + Nanos(i64::from(*pause % 32));
+        let (piece, after) = rest.split_at(usize::from(*length).min(rest.len()));
+        stream = after;
+        let mut whole = Vec::new();
+        if (2..=PDU_LIMIT + 1).contains(&piece.len()) && *pause >= 128 {
+            ascii::append(piece[0], &mut whole, |pdu| pdu.extend_from_slice(&piece[1..]));
+            assert!(whole.len() <= ascii::ADU_LIMIT);
+        }
+        let is_whole = !whole.is_empty();
+        let mut line = if is_whole { &whole[..] } else { piece };
+        let mut asked = 0;
+        loop {
+            framer.arrived(now, &mut line);
+            let taken = framer.take(now, |bytes| {
+                if let Some((number, pdu)) = bytes.and_then(ascii::parse) {
+                    unit.ask(pdu);
+                    asked += 1;
+                    assert!(!is_whole || (number, pdu) == (piece[0], &piece[1..]));
+                }
+            });
+            if taken.is_none() {
+                break;
+            }
+        }
+        assert!(line.is_empty() && asked == usize::from(is_whole) || !is_whole);
+        assert!(framer.deadline() > now);
     }
 }
 

@@ -19,6 +19,8 @@ mod iec2c;
 #[cfg(feature = "opcua")]
 mod java;
 mod modbus;
+#[cfg(feature = "modbus-tls")]
+mod modbus_tls;
 #[cfg(feature = "page")]
 mod observed_rig;
 mod observer;
@@ -54,6 +56,8 @@ fn main() -> ExitCode {
         #[cfg(feature = "opcua")]
         ("opcua", opcua::TESTS),
         ("modbus", modbus::TESTS),
+        #[cfg(feature = "modbus-tls")]
+        ("modbus_tls", modbus_tls::TESTS),
         #[cfg(feature = "page")]
         ("observed_rig", observed_rig::TESTS),
         ("observer", observer::TESTS),

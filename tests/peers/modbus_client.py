@@ -1,8 +1,8 @@
 """Drives a Modbus server with pymodbus: every function, and requests that the server must refuse.
 
-modbus_client.py tcp HOST PORT | modbus_client.py rtu-over-tcp HOST PORT | modbus_client.py rtu DEVICE
+modbus_client.py tcp|udp|rtu-over-tcp HOST PORT | modbus_client.py rtu|ascii DEVICE
 
-The server has 64 bytes each way and brings each byte of %Q back on the byte of %I at the same offset; with RTU
+The server has 64 bytes each way and brings each byte of %Q back on the byte of %I at the same offset; with RTU and ASCII
 it is unit 1. The last line has the number of checks.
 """
 
@@ -10,7 +10,7 @@ import sys
 import time
 
 from pymodbus import FramerType
-from pymodbus.client import ModbusSerialClient, ModbusTcpClient
+from pymodbus.client import ModbusSerialClient, ModbusTcpClient, ModbusUdpClient
 
 checks = 0
 
@@ -71,11 +71,37 @@ def refusals(client):
     refused("coil beyond", client.write_coil(512, True), 2)
     refused("mask beyond", client.mask_write_register(address=32), 2)
     refused("function 7", client.read_exception_status(), 1)
-    refused("function 8", client.diag_query_data(b"\0\0"), 1)
+    if sys.argv[1] in ("tcp", "udp"):
+        refused("function 8", client.diag_query_data(b"\0\0"), 1)
     refused("function 17", client.report_device_id(), 1)
     refused("function 24", client.read_fifo_queue(address=0), 1)
     refused("object", client.read_device_information(read_code=4, object_id=9), 2)
     check("nothing was written", client.read_holding_registers(31, count=1).registers, [0x8201])
+
+
+def diagnostics(client):
+    """Counters and events, which servers on serial lines have."""
+    check("query", client.diag_query_data(b"\xa5\x37").message, b"\xa5\x37")
+    check("clear", client.diag_clear_counters().isError(), False)
+    check("bus messages", client.diag_read_bus_message_count().message, 1)
+    refused("a coil beyond", client.read_coils(512, count=1), 2)
+    check("exceptions", client.diag_read_bus_exception_error_count().message, 1)
+    check("messages", client.diag_read_device_message_count().message, 4)
+    check("damaged", client.diag_read_bus_comm_error_count().message, 0)
+    check("overruns", client.diag_read_bus_char_overrun_count().message, 0)
+    check("busy", client.diag_read_device_busy_count().message, 0)
+    check("register", client.diag_read_diagnostic_register().message, 0)
+    counter = client.diag_get_comm_event_counter()
+    check("events", (counter.isError(), counter.count), (False, 7))
+    # Neither has an answer: the unit only listens, and a restart ends that.
+    client.diag_force_listen_only(no_response_expected=True)
+    client.diag_restart_communication(0, no_response_expected=True)
+    time.sleep(0.3)
+    check("it answers again", client.read_coils(0, count=1).isError(), False)
+    check("no responses", client.diag_read_device_no_response_count().message, 0)
+    log = client.diag_get_comm_event_log()
+    check("log", (log.event_count, log.message_count, log.events[:6]), (2, 3, [0x80, 0x40, 0x80, 0x40, 0x80, 0x00]))
+    check("overrun", client.diag_clear_overrun_counter().isError(), False)
 
 
 def floats(client):
@@ -88,8 +114,9 @@ def floats(client):
 
 
 def main():
-    if sys.argv[1] == "tcp":
-        client = ModbusTcpClient(sys.argv[2], port=int(sys.argv[3]), retries=0)
+    if sys.argv[1] in ("tcp", "udp"):
+        kind = ModbusTcpClient if sys.argv[1] == "tcp" else ModbusUdpClient
+        client = kind(sys.argv[2], port=int(sys.argv[3]), retries=0)
         check("connect", client.connect(), True)
         for unit in (0, 1, 17, 255):
             given = client.read_holding_registers(0, count=1, device_id=unit)
@@ -97,6 +124,9 @@ def main():
     else:
         if sys.argv[1] == "rtu":
             client = ModbusSerialClient(sys.argv[2], baudrate=115200, parity="N", stopbits=1, retries=0)
+        elif sys.argv[1] == "ascii":
+            client = ModbusSerialClient(
+                sys.argv[2], framer=FramerType.ASCII, baudrate=115200, bytesize=7, parity="E", retries=0)
         else:
             client = ModbusTcpClient(sys.argv[2], port=int(sys.argv[3]), framer=FramerType.RTU, retries=0)
         check("open", client.connect(), True)
@@ -107,6 +137,8 @@ def main():
         check("broadcast", client.read_holding_registers(20, count=1).registers, [4711])
     functions(client)
     refusals(client)
+    if sys.argv[1] not in ("tcp", "udp"):
+        diagnostics(client)
     floats(client)
     client.close()
     print(f"modbus_client: ok checks={checks}")

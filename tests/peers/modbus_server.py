@@ -1,16 +1,19 @@
 """A Modbus server by pymodbus, with all four tables.
 
-modbus_server.py tcp HOST PORT | modbus_server.py rtu-over-tcp HOST PORT | modbus_server.py rtu DEVICE
+modbus_server.py tcp|udp|rtu-over-tcp HOST PORT | modbus_server.py rtu|ascii DEVICE | modbus_server.py tls HOST PORT FOLDER
+
+With TLS the folder has server.pem, server.key, and ca.pem for the certificates of clients.
 
 Input register n is 7 n, discrete input n is on where n is a multiple of 3; coils and holding registers are zero.
 """
 
 import asyncio
+import ssl
 import sys
 
 from pymodbus import FramerType, ModbusDeviceIdentification
 from pymodbus.datastore import ModbusDeviceContext, ModbusSequentialDataBlock, ModbusServerContext
-from pymodbus.server import ModbusSerialServer, ModbusTcpServer
+from pymodbus.server import ModbusSerialServer, ModbusTcpServer, ModbusTlsServer, ModbusUdpServer
 
 
 async def main():
@@ -23,7 +26,20 @@ async def main():
     context = ModbusServerContext(devices=device)
     identity = ModbusDeviceIdentification(
         info_name={"VendorName": "ACME", "ProductCode": "PLC 7", "MajorMinorRevision": "1.2"})
-    if sys.argv[1] != "rtu":
+    if sys.argv[1] == "udp":
+        server = ModbusUdpServer(context, identity=identity, address=(sys.argv[2], int(sys.argv[3])))
+    elif sys.argv[1] == "tls":
+        folder = sys.argv[4]
+        secured = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH, cafile=f"{folder}/ca.pem")
+        secured.verify_mode = ssl.CERT_REQUIRED
+        secured.load_cert_chain(f"{folder}/server.pem", f"{folder}/server.key")
+        server = ModbusTlsServer(
+            context, identity=identity, sslctx=secured, address=(sys.argv[2], int(sys.argv[3])))
+    elif sys.argv[1] == "ascii":
+        server = ModbusSerialServer(
+            context, identity=identity, framer=FramerType.ASCII, port=sys.argv[2], baudrate=115200, bytesize=7,
+            parity="E")
+    elif sys.argv[1] != "rtu":
         framer = FramerType.SOCKET if sys.argv[1] == "tcp" else FramerType.RTU
         server = ModbusTcpServer(
             context, identity=identity, framer=framer, address=(sys.argv[2], int(sys.argv[3])))

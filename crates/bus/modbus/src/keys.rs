@@ -8,6 +8,7 @@ use crate::identity::IDENTITY_KEYS;
 use crate::line::{BAUDS, FRAMINGS, PARITIES};
 use crate::server::{FILES, QUEUES, RANGE_KEYS, RANGES};
 use crate::stations::IDENTITY_LIMIT;
+use crate::tls_options;
 
 /// The line of both ends.
 pub(crate) const LINE: &[Key] = &[
@@ -116,6 +117,11 @@ pub(crate) const SERVER: &[Key] = &[
         "Holding registers that count the registers behind them, which function 24 reads as a queue",
     ),
     Key::new(
+        "tls",
+        Shape::Table(tls_options::SERVER_KEYS),
+        "Modbus/TCP Security: the certificates, and the roles that may write",
+    ),
+    Key::new(
         "files",
         Shape::List(&Shape::Whole(1, 0xFFFF), 1, FILES),
         "The numbers of the files that functions 20 and 21 read and write, each with 10,000 records",
@@ -139,6 +145,11 @@ pub(crate) const CLIENT: &[Key] = &[
     )
     .or("true"),
     WRITE_TO,
+    Key::new(
+        "tls",
+        Shape::Table(tls_options::CLIENT_KEYS),
+        "Modbus/TCP Security: the certificates",
+    ),
 ];
 
 const AREA: Shape = Shape::Any(&[Shape::Text, Shape::List(&Shape::Table(PART_KEYS), 1, PARTS)]);

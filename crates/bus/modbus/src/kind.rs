@@ -1,5 +1,8 @@
 //! The kinds `modbus-server` and `modbus-client`, for the list of bus kinds.
 
+use std::path::Path;
+
+use crate::tls_options::Tls;
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Key, Table};
@@ -8,7 +11,8 @@ use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, CYCLE, NamedFile,
 use tickbus_image::signal::{Signal, SignalTable};
 use tickbus_net::Address;
 
-use super::{ClientOptions, ModbusClient, ModbusServer, ServerOptions, keys};
+use super::{ClientOptions, Line, ModbusClient, ModbusServer, ServerOptions, keys, tls};
+use crate::tls::{ClientSide, ServerSide};
 
 impl BusKind for ServerOptions {
     const NAME: &'static str = "modbus-server";
@@ -27,11 +31,23 @@ impl BusOptions for ServerOptions {
     }
 
     fn files(&self) -> Vec<NamedFile> {
-        Vec::new()
+        self.tls.as_ref().map_or_else(Vec::new, Tls::files)
+    }
+
+    fn check_files(&self, folder: &Path, _table: &SignalTable, collector: &Collector<'_>) {
+        if let Some(own) = &self.tls
+            && let Err(mistake) = tls::check(own, folder, true)
+        {
+            collector.collect(own.at, mistake);
+        }
     }
 
     fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
-        let server = ModbusServer::new(self, setup);
+        let tls = self.tls.as_ref();
+        let tls = tls
+            .map(|tls| ServerSide::load(tls, setup.folder))
+            .transpose()?;
+        let server = ModbusServer::new(self, setup).within(tls);
         Ok(Bus::Free(Box::new(server)))
     }
 
@@ -85,11 +101,23 @@ impl BusOptions for ClientOptions {
     }
 
     fn files(&self) -> Vec<NamedFile> {
-        Vec::new()
+        self.tls.as_ref().map_or_else(Vec::new, Tls::files)
+    }
+
+    fn check_files(&self, folder: &Path, _table: &SignalTable, collector: &Collector<'_>) {
+        if let Some(own) = &self.tls
+            && let Err(mistake) = tls::check(own, folder, false)
+        {
+            collector.collect(own.at, mistake);
+        }
     }
 
     fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
-        let client = ModbusClient::new(self, setup.table, setup.role, setup.cycle);
+        let tls = match (&self.tls, &self.line) {
+            (Some(tls), Line::Tcp(address)) => Some(ClientSide::load(tls, address, setup.folder)?),
+            _ => None,
+        };
+        let client = ModbusClient::new(self, setup.table, setup.role, setup.cycle).within(tls);
         Ok(Bus::Free(Box::new(client)))
     }
 

@@ -43,6 +43,7 @@ mod kind;
 mod line;
 pub mod mbap;
 mod piece;
+mod restricts;
 pub mod rtu;
 mod server;
 mod shown;
@@ -50,6 +51,12 @@ mod stations;
 mod table;
 mod tables;
 mod tag_address;
+#[cfg(feature = "tls")]
+mod tls;
+#[cfg(not(feature = "tls"))]
+#[path = "no_tls.rs"]
+mod tls;
+mod tls_options;
 
 pub use answer::{Done, answer, refuse};
 pub use client::{
@@ -66,6 +73,7 @@ pub use stations::Stations;
 pub use table::{Span, Table};
 pub use tables::{Map, Side, Tables};
 pub use tag_address::TagAddress;
+pub use tls_options::Tls;
 
 /// The default holding register at which `%I` begins in a server, PLC or machine: after the outputs except for very
 /// large ones, and where `OpenPLC` has its memory words.

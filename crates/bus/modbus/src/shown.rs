@@ -3,12 +3,15 @@
 use tickbus_fieldbus::{OBSERVES, Role};
 use tickbus_image::signal::{Area, DataType, Signal, SignalTable};
 
+use crate::Tls;
+
 use super::{Block, ClientOptions, ElementAddress, Request, ServerOptions, Side, Table};
 
 impl ServerOptions {
     /// Describes the line, given the signal table.
     pub fn shown(&self, signals: &SignalTable) -> Vec<String> {
         let mut parts = vec![format!("listens on {}", self.line)];
+        parts.extend(self.tls.as_ref().map(Tls::shown));
         parts.extend(self.stations.shown(None));
         let bytes = |area| {
             signals
@@ -75,6 +78,7 @@ impl ClientOptions {
     pub fn shown(&self, role: Role, table: &SignalTable) -> Vec<String> {
         let (own, others) = role.areas();
         let mut parts = vec![format!("asks {}", self.line)];
+        parts.extend(self.tls.as_ref().map(Tls::shown));
         parts.extend(self.stations.shown(Some(self.unit(0))));
         parts.extend([others, own].map(|area| {
             let does = if role.writes(area) { "writes" } else { "reads" };

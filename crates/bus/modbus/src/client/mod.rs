@@ -17,7 +17,8 @@ use tickbus_fieldbus::{BusError, CYCLE, Free, Medium, Port, Role};
 use tickbus_image::signal::SignalTable;
 use tickbus_net::{Address, Datagrams, serial};
 
-use super::{Coding, Line};
+use super::{Coding, Line, tls};
+use crate::tls::ClientSide;
 pub use area_mapping::Block;
 pub(crate) use area_mapping::{PART_KEYS, PARTS};
 pub use options::ClientOptions;
@@ -28,6 +29,9 @@ use session::{ClientSession, Framing, Station};
 /// The time for a server to acknowledge sent data, as a multiple of `max_age`.
 const PATIENCE: i64 = 4;
 
+/// The time for a server to show its certificate.
+const HANDSHAKE: Nanos = Nanos::from_secs(5);
+
 /// The bus of kind `modbus-client`.
 #[derive(Debug)]
 pub struct ModbusClient {
@@ -35,6 +39,7 @@ pub struct ModbusClient {
     cycle: Nanos,
     stations: Vec<Station>,
     guards: Vec<WriteGuard>,
+    tls: Option<ClientSide>,
 }
 
 impl ModbusClient {
@@ -64,7 +69,14 @@ impl ModbusClient {
             cycle: cycle.unwrap_or(CYCLE),
             stations,
             guards,
+            tls: None,
         }
+    }
+
+    /// The same client within TLS, if `tls` is there.
+    pub(crate) fn within(mut self, tls: Option<ClientSide>) -> Self {
+        self.tls = tls;
+        self
     }
 
     fn session(
@@ -124,8 +136,15 @@ impl Free for ModbusClient {
                         inbox,
                     },
                 };
-                let mut session = self.session(framing, peer.to_string(), port, port.clock().now());
-                call.run(&mut session, port, stop)
+                let (tls, peer) = (self.tls.clone(), peer.to_string());
+                let mut session = self.session(framing, peer.clone(), port, port.clock().now());
+                match tls {
+                    None => call.run(&mut session, port, stop),
+                    Some(side) => {
+                        let peer = (peer, HANDSHAKE);
+                        tls::call(&side, &mut call, &mut session, peer, port, stop)
+                    }
+                }
             }
             Line::Udp(ref address) => {
                 let Some((stream, peer)) = connect(address, port, stop)? else {

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use crate::line::Line;
 use crate::stations::{Stations, UnitRange, read_write_to};
 use crate::table::Table as OfTable;
+use crate::tls_options::Tls;
 use crate::{ElementAddress, INPUTS, TagAddress};
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
@@ -46,6 +47,8 @@ pub struct ClientOptions {
     pub at: BTreeMap<String, TagAddress>,
     /// The time-out for an answer, if stated.
     pub timeout: Option<Nanos>,
+    /// The certificates of an encrypted line.
+    pub tls: Option<Tls>,
     /// True if a single request may write and read.
     pub combine: bool,
     pub(super) role: Role,
@@ -67,7 +70,11 @@ impl ClientOptions {
         let timeout = table.take("timeout");
         let combine = table.take("read_write");
         let write_to = table.take("write_to");
+        let tls = table.take("tls");
 
+        let tls = tls.as_ref().map_or(Some(None), |value| {
+            Tls::read(value, line.as_ref(), false).map(Some)
+        });
         let units = match &line {
             Some(Line::Serial(_) | Line::RtuOverTcp(_)) => UnitRange::Serial,
             _ => UnitRange::Tcp,
@@ -91,6 +98,7 @@ impl ClientOptions {
             outputs: outputs?,
             at: BTreeMap::new(),
             timeout: timeout?,
+            tls: tls?,
             combine: combine?,
             role,
         })

@@ -13,7 +13,8 @@ mod units;
 use tickbus_base::time::Stop;
 use tickbus_fieldbus::{BusError, BusSetup, Free, Medium, Port, tcp as many};
 
-use super::Line;
+use super::{Line, tls};
+use crate::tls::ServerSide;
 pub(crate) use files::FILES;
 pub(crate) use options::QUEUES;
 pub use options::ServerOptions;
@@ -26,6 +27,7 @@ use units::ServedUnits;
 pub struct ModbusServer {
     options: ServerOptions,
     units: ServedUnits,
+    tls: Option<ServerSide>,
 }
 
 impl ModbusServer {
@@ -34,7 +36,14 @@ impl ModbusServer {
         Self {
             options: options.clone(),
             units: ServedUnits::new(options, setup),
+            tls: None,
         }
+    }
+
+    /// The same server within TLS, if `tls` is there.
+    pub(crate) fn within(mut self, tls: Option<ServerSide>) -> Self {
+        self.tls = tls;
+        self
     }
 }
 
@@ -49,7 +58,13 @@ impl Free for ModbusServer {
                     patience: port.max_age(),
                 };
                 port.carried_by(Medium::Tcp);
-                many::serve(address, &mut service, port, stop)
+                match (&self.tls, &self.options.tls) {
+                    (Some(side), Some(tls)) => {
+                        let roles = tls.write_roles.as_deref();
+                        tls::serve(side, roles, service, address, port, stop)
+                    }
+                    _ => many::serve(address, &mut service, port, stop),
+                }
             }
             Line::Udp(address) => {
                 udp::serve(address, &mut self.units, self.options.clients, port, stop)

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use crate::line::Line;
 use crate::stations::{Stations, UnitRange};
 use crate::table::Span;
+use crate::tls_options::Tls;
 use crate::{ElementAddress, INPUTS, Side, TagAddress, table};
 use tickbus_base::toml_text::{Collector, Table, Value};
 use tickbus_fieldbus::Role;
@@ -53,6 +54,8 @@ pub struct ServerOptions {
     pub files: Vec<u16>,
     /// If stated, whether the device has functions 8, 11 and 12.
     diagnostics: Option<bool>,
+    /// The certificates of an encrypted line.
+    pub tls: Option<Tls>,
     /// True if a client may not write data that another client has written recently.
     pub is_single_writer: bool,
 }
@@ -70,8 +73,12 @@ impl ServerOptions {
         let queues = table.take("queues");
         let files = table.take("files");
         let diagnostics = table.take("diagnostics");
+        let tls = table.take("tls");
         let is_single_writer = Writers::read(table);
 
+        let tls = tls.as_ref().map_or(Some(None), |value| {
+            Tls::read(value, line.as_ref(), true).map(Some)
+        });
         let units = match &line {
             Some(Line::Serial(_) | Line::RtuOverTcp(_)) => UnitRange::ServedOnSerial,
             _ => UnitRange::Tcp,
@@ -119,6 +126,7 @@ impl ServerOptions {
             queues: queues?,
             files: files?,
             diagnostics: diagnostics?,
+            tls: tls?,
             is_single_writer: is_single_writer?,
         })
     }

@@ -40,6 +40,7 @@ pub(super) fn serve(
         source: Source {
             renewals: vec![Renewal::of_only_client(); units.len()].into(),
             writer: None,
+            may_write: true,
         },
         units,
         framer: Framer::new(line.coding, line.silence),

@@ -4,6 +4,7 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 
 use crate::mbap::{self, ADU_LIMIT, Telegram};
+use crate::restricts::Restricts;
 use crate::{Exception, answer, refuse, rtu};
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::tcp::{Limits, Service};
@@ -80,6 +81,12 @@ impl TcpService<'_> {
     }
 }
 
+impl Restricts for TcpService<'_> {
+    fn restrict(client: &mut Client) {
+        client.source.may_write = false;
+    }
+}
+
 impl Service for TcpService<'_> {
     type Client = Client;
 
@@ -101,6 +108,7 @@ impl Service for TcpService<'_> {
             source: Source {
                 renewals: vec![Renewal::of_new_client(); self.units.len()].into(),
                 writer: Some(Arc::new(peer)),
+                may_write: true,
             },
         }
     }

@@ -231,6 +231,7 @@ impl Server<'_> {
         let source = Source {
             renewals: renewals.into(),
             writer: Some(Arc::new(from)),
+            may_write: true,
         };
         let client = Client {
             source,

@@ -50,6 +50,8 @@ pub(super) struct Source {
     pub(super) renewals: Box<[Renewal]>,
     /// The client; `None` on a line that has one master.
     pub(super) writer: Option<Writer>,
+    /// False if requests that change anything are refused with exception 01.
+    pub(super) may_write: bool,
 }
 
 /// The values of a station's frame in an answer: they count as sent once the client has the answer.
@@ -140,7 +142,9 @@ impl ServedUnits {
             if !self.begin(station, pdu, false) {
                 return None;
             }
-            let carried = match port.answer(station, pdu[0], now) {
+            let forbidden = !source.may_write && changes(pdu[0]);
+            let forbidden = forbidden.then_some(Exception::ILLEGAL_FUNCTION.0);
+            let carried = match forbidden.or_else(|| port.answer(station, pdu[0], now)) {
                 Some(code) => {
                     let exception = Exception(code);
                     refuse(pdu[0], exception, reply);
@@ -305,6 +309,13 @@ impl ServedUnits {
             }
         }
     }
+}
+
+/// Returns true if requests with this function code change values, files or the state of the unit.
+fn changes(code: u8) -> bool {
+    Function::of(code).is_some_and(|function| {
+        function.writes() || matches!(function, Function::WriteFileRecord | Function::Diagnostics)
+    })
 }
 
 impl Unit {

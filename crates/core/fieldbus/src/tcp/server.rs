@@ -55,6 +55,12 @@ pub trait Service {
         port: &mut Port,
     ) -> Result<usize, BusError>;
 
+    /// Returns true if a client that has sent telegrams is present as a peer; false while it still proves who it is.
+    fn speaks(&self, client: &Self::Client) -> bool {
+        let _ = client;
+        true
+    }
+
     /// The system has accepted all answers made by the last calls of [`telegram`](Self::telegram) for this
     /// client. Not called for answers that had to wait for a slow client.
     fn replied(&mut self, client: &mut Self::Client, port: &mut Port);
@@ -362,7 +368,7 @@ impl<S: Service> Server<'_, S> {
             // The incomplete part belongs to another telegram, which has its own time.
             let since = client.waits_since.map(|_| now);
             client.owes_since(since, place, &mut self.clients.awaited);
-            if !client.speaks {
+            if !client.speaks && self.service.speaks(&client.state) {
                 client.speaks = true;
                 self.gone = None;
                 self.clients.speakers += 1;

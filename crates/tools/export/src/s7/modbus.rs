@@ -16,8 +16,8 @@ const HOLDING_REGISTERS: u8 = 116;
 
 /// The simulation is the server: the PLC reads its inputs and writes its outputs alternately.
 pub(super) fn client(plan: &Plan<'_>, options: &ServerOptions, notes: &mut Vec<String>) -> Body {
-    let Line::Tcp(address) = &options.line else {
-        return by_hand("modbus-server with RTU", notes);
+    let (Line::Tcp(address), None) = (&options.line, &options.tls) else {
+        return by_hand("modbus-server with RTU, ASCII, UDP or TLS", notes);
     };
     if plan.config.table.stations.len() > 1 {
         return by_hand("modbus-server with several units", notes);
@@ -142,8 +142,8 @@ fn turns(plan: &Plan<'_>, inputs: usize, outputs: usize) -> Vec<String> {
 
 /// The simulation connects: the PLC serves an array of registers.
 pub(super) fn server(plan: &Plan<'_>, options: &ClientOptions, notes: &mut Vec<String>) -> Body {
-    let Line::Tcp(address) = &options.line else {
-        return by_hand("modbus-client with RTU", notes);
+    let (Line::Tcp(address), None) = (&options.line, &options.tls) else {
+        return by_hand("modbus-client with RTU, ASCII, UDP or TLS", notes);
     };
     if plan.config.table.stations.len() > 1 {
         return by_hand("modbus-client with several units", notes);

@@ -4,7 +4,7 @@
 use super::Editor;
 use super::parts::{Link, dialled, loopback_note};
 use crate::st::telegrams::Telegrams;
-use tickbus_bus_modbus::{Line, ServerOptions};
+use tickbus_bus_modbus::{Coding, Line, ServerOptions};
 use tickbus_driver_cfg::Config;
 
 pub(super) fn link(config: &Config, options: &ServerOptions, editor: Editor, list: &str) -> Link {
@@ -16,8 +16,18 @@ pub(super) fn link(config: &Config, options: &ServerOptions, editor: Editor, lis
             address.port
         )],
         (Line::Serial(serial), Editor::Codesys) => vec![format!(
-            "Device tree: Modbus COM, {} > Modbus Client, COM Port > for each unit below a Modbus Server, COM Port.",
-            serial.settings
+            "Device tree: Modbus COM, {} > Modbus Client, COM Port{} > for each unit below a Modbus Server, COM Port.",
+            serial.settings,
+            match serial.coding {
+                Coding::Rtu => "",
+                Coding::Ascii => ", transmission mode ASCII",
+            }
+        )],
+        (Line::Udp(address), _) => vec![format!(
+            "The editor has no client for Modbus over UDP: ask {} at port {} by a program of your own, or remove \
+             `framing` from the driver.cfg and export again.",
+            dialled(address),
+            address.port
         )],
         (Line::RtuOverTcp(address), _) => vec![format!(
             "Modbus RTU with {}, on a serial port that a serial device server, as a TCP client, joins with {} and port {}.",
@@ -43,8 +53,12 @@ pub(super) fn link(config: &Config, options: &ServerOptions, editor: Editor, lis
         ],
         (Line::Serial(serial), Editor::TwinCat) => vec![format!(
             "Install TF6255 (Modbus RTU) with its licence on the target, {}; for each line below call ReadInputRegs and \
-             WriteRegs of ModbusRtuMasterV2.",
-            serial.settings
+             WriteRegs of ModbusRtuMasterV2{}.",
+            serial.settings,
+            match serial.coding {
+                Coding::Rtu => "",
+                Coding::Ascii => ", which has no ASCII: remove `framing` from the driver.cfg and export again",
+            }
         )],
     };
     for telegrams in Telegrams::all(config, options) {

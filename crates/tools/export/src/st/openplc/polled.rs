@@ -7,7 +7,7 @@ use super::wired::{self, Wires};
 use crate::st::telegrams::Telegrams;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::Mistakes;
-use tickbus_bus_modbus::{Line, ServerOptions};
+use tickbus_bus_modbus::{Coding, Line, Serial, ServerOptions};
 use tickbus_driver_cfg::Config;
 use tickbus_image::signal::Area;
 
@@ -105,6 +105,13 @@ fn place(line: &Line) -> String {
              simulation's computer and port {}",
             address.port
         ),
+        Line::Udp(_) => "over TCP, since OpenPLC speaks no Modbus over UDP: remove `framing` from the driver.cfg and \
+                         export again"
+            .to_owned(),
+        Line::Serial(Serial {
+            coding: Coding::Ascii,
+            ..
+        }) => "with RTU, since OpenPLC speaks no ASCII: remove `framing` from the driver.cfg and export again".to_owned(),
         Line::Serial(serial) => format!(
             "as Generic Modbus RTU Device on the port that is wired to the simulation's, {}",
             serial.settings

@@ -85,6 +85,7 @@ pub(super) fn run(arguments: &Arguments, stop: &Stop) -> Outcome {
                     ParityBit::Odd => Parity::Odd,
                 },
                 two_stop_bits: false,
+                seven_bits: false,
                 rs485: false,
             };
             Device::Port(device.clone().unwrap_or_default(), settings)

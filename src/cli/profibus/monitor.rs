@@ -71,6 +71,7 @@ fn listen(arguments: &Arguments) -> Result<(), String> {
         baud: arguments.baud,
         parity: Parity::Even,
         two_stop_bits: false,
+        seven_bits: false,
         rs485: false,
     };
     if arguments.baud == 0 {

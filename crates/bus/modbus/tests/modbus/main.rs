@@ -14,6 +14,7 @@ mod plc;
 #[path = "../../../../../tests/peers/pty.rs"]
 mod pty;
 mod rtu;
+mod udp;
 
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;

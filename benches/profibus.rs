@@ -74,6 +74,7 @@ mod core {
                 fail_safe: false,
                 dpv1: false,
                 max_diagnosis: DATA_LIMIT,
+                acyclic: Acyclic::default(),
             };
             Station::new(address, identity)
         };

@@ -36,6 +36,7 @@ fn line(dpv1: bool, mut stream: &[u8]) {
             fail_safe: address == 4,
             dpv1,
             max_diagnosis: 6 + usize::from(address),
+            acyclic: acyclic(),
         };
         Station::new(address, identity)
     };

@@ -163,6 +163,14 @@ impl Configuration {
         &self.modules
     }
 
+    /// The highest slot; any that a station can have if its modules are unknown.
+    pub fn slots(&self) -> u8 {
+        if self.sizes_only {
+            return u8::MAX - 1;
+        }
+        u8::try_from(self.modules.len()).unwrap_or(u8::MAX - 1)
+    }
+
     /// True if any other modules of the same sizes are accepted.
     pub fn has_sizes_only(&self) -> bool {
         self.sizes_only

@@ -9,6 +9,7 @@ use tickbus_fieldbus::{BusError, Cause, Free, PlcState, Port, Receipt};
 
 use crate::event::{Event, Leaving};
 use crate::layout::Layout;
+use crate::records::RecordLayout;
 use crate::station::{Identity, Process};
 
 /// The line's message while it has no master.
@@ -41,6 +42,8 @@ pub(crate) struct StationSetup {
     /// The positions of the signals among the bytes that the station sends and receives.
     pub(crate) inputs: Layout,
     pub(crate) outputs: Layout,
+    /// The positions of the signals in each record.
+    pub(crate) records: Vec<RecordLayout>,
     /// The bytes of `%I` and of `%Q` in the PLC's image.
     pub(crate) sizes: [usize; 2],
 }
@@ -78,6 +81,20 @@ struct Side {
     outputs: Layout,
     /// The outputs in the layout of the image.
     frame: Vec<u8>,
+    /// The records, each with its octets as a master last wrote them.
+    records: Vec<(RecordLayout, Vec<u8>)>,
+    /// A master has written a record since the last outputs.
+    is_written: bool,
+    is_cleared: bool,
+}
+
+impl Side {
+    /// Copies the outputs in all records into the frame of the image.
+    fn take_records(&mut self) {
+        for (layout, octets) in &self.records {
+            layout.take(octets, &mut self.frame);
+        }
+    }
 }
 
 impl Stations {
@@ -89,6 +106,13 @@ impl Stations {
             inputs: setup.inputs.clone(),
             outputs: setup.outputs.clone(),
             frame: vec![0; port.sizes(index).1],
+            records: {
+                let records = setup.identity.acyclic.records.iter();
+                let octets = records.map(|record| record.octets.clone());
+                setup.records.iter().cloned().zip(octets).collect()
+            },
+            is_written: false,
+            is_cleared: false,
         };
         Self {
             all: setups.iter().enumerate().map(side).collect(),
@@ -187,18 +211,44 @@ impl Process for Machine<'_> {
 
     fn outputs(&mut self, station: u8, now: Nanos, outputs: &[u8]) {
         let index = self.index(station);
-        let Side {
-            outputs: layout,
-            frame,
-            ..
-        } = &mut self.stations.all[index];
-        self.port
-            .received(index, now, layout.receive(outputs, frame));
+        let side = &mut self.stations.all[index];
+        side.is_written = false;
+        if side.records.is_empty() {
+            let frame = side.outputs.receive(outputs, &mut side.frame);
+            return self.port.received(index, now, frame);
+        }
+        side.outputs.receive(outputs, &mut side.frame);
+        side.take_records();
+        self.port.received(index, now, &side.frame);
     }
 
     fn alive(&mut self, station: u8, now: Nanos) {
         let index = self.index(station);
-        self.port.touch(index, now);
+        let side = &mut self.stations.all[index];
+        if side.is_cleared || !std::mem::take(&mut side.is_written) {
+            return self.port.touch(index, now);
+        }
+        side.take_records();
+        self.port.received(index, now, &side.frame);
+    }
+
+    fn read_record(&mut self, station: u8, now: Nanos, record: usize, octets: &mut [u8]) {
+        let index = self.index(station);
+        self.port.count("profibus-device.records_read");
+        // The line is up: a request has come over it.
+        if let Some(mut frames) = self.port.look(index..index + 1, now) {
+            let (layout, _) = &self.stations.all[index].records[record];
+            layout.fill(frames.frame(index), octets);
+        }
+    }
+
+    /// The outputs in the record become those of the image with the next exchange, which shows that the master lives.
+    fn wrote_record(&mut self, station: u8, _now: Nanos, record: usize, octets: &[u8]) {
+        let index = self.index(station);
+        self.port.count("profibus-device.records_written");
+        let side = &mut self.stations.all[index];
+        side.records[record].1.copy_from_slice(octets);
+        side.is_written = true;
     }
 
     fn tell(&mut self, station: u8, now: Nanos, event: Event) {
@@ -214,10 +264,33 @@ impl Process for Machine<'_> {
                 self.port
                     .running(&format!("master {master} exchanges data"));
             }
-            Event::Cleared => self.port.plc_state(index, now, PlcState::Stop),
-            Event::Operates => self.port.plc_state(index, now, PlcState::Run),
+            Event::Cleared => {
+                self.stations.all[index].is_cleared = true;
+                self.port.plc_state(index, now, PlcState::Stop);
+            }
+            Event::Operates => {
+                self.stations.all[index].is_cleared = false;
+                self.port.plc_state(index, now, PlcState::Run);
+            }
+            Event::RecordRefused {
+                master,
+                writes,
+                slot,
+                index,
+                why,
+            } => {
+                let verb = if writes { "write" } else { "read" };
+                self.port.log(
+                    log::Level::Warn,
+                    "record refused",
+                    format_args!(
+                        "station {station}: master {master} cannot {verb} record {index} of slot {slot}: {why}"
+                    ),
+                );
+            }
             Event::Left(why) => {
                 self.stations.all[index].receipt = None;
+                self.stations.all[index].is_cleared = false;
                 if std::mem::take(&mut self.stations.all[index].exchanges) {
                     // The outputs are cleared at once, however recent they are.
                     let reason = format!("station {station}: {why}");

@@ -4,6 +4,8 @@ use std::fmt;
 
 use tickbus_base::time::Nanos;
 
+use crate::acyclic::Refusal;
+
 /// An event of a station, for the state of the line and the log.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Event {
@@ -21,6 +23,19 @@ pub enum Event {
     Cleared,
     /// The master sets the outputs again.
     Operates,
+    /// A master's request for a record was refused.
+    RecordRefused {
+        /// The master's address.
+        master: u8,
+        /// The request was to write.
+        writes: bool,
+        /// The slot.
+        slot: u8,
+        /// The index.
+        index: u8,
+        /// Why.
+        why: Refusal,
+    },
     /// The station no longer exchanges data, or never did: why.
     Left(Leaving),
 }

@@ -65,6 +65,18 @@ pub struct Gsd {
     pub set_slave_add: bool,
     /// True if the device has the parameter octets of DPV1.
     pub dpv1: bool,
+    /// The order number.
+    pub order: String,
+    /// True if the master that owns the station can read and write records.
+    pub c1_read_write: bool,
+    /// The most octets of a record for that master.
+    pub c1_max_data: u8,
+    /// True if other masters can read and write records.
+    pub c2_read_write: bool,
+    /// The most octets of a record for other masters.
+    pub c2_max_data: u8,
+    /// The connections that other masters can have at a time; 0 if the file does not say.
+    pub c2_channels: u8,
     /// The parameters of the device itself.
     pub parameters: Arc<ParameterBlock>,
     /// The meaning of the device-related diagnosis.

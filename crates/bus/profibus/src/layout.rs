@@ -1,6 +1,7 @@
 //! The positions of signals in the telegrams: at their image addresses, or where `[fieldbus.at]` puts them in a module.
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::ops::Range;
 use std::str::FromStr;
 
@@ -10,30 +11,48 @@ use tickbus_image::signal::{Address, Addressing, Area, Signal};
 
 use crate::configuration::Configuration;
 
-const EXAMPLE: &str = "write the slot and the address in its module, such as \"slot 2 %IW0\"";
+const EXAMPLE: &str = "write the slot and the address in its module, such as \"slot 2 %IW0\", or in one of its records, \
+                       such as \"slot 2 record 10 %IW0\"";
 
-/// A position in a module, as in `[fieldbus.at]`: `slot 2 %IW0`.
+/// A position in a module or a record, as in `[fieldbus.at]`: `slot 2 %IW0`, `slot 2 record 10 %IW0`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Place {
     pub(crate) slot: usize,
+    /// The index of the record.
+    pub(crate) record: Option<u8>,
     pub(crate) address: Address,
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "slot {} ", self.slot)?;
+        if let Some(record) = self.record {
+            write!(f, "record {record} ")?;
+        }
+        self.address.fmt(f)
+    }
 }
 
 impl FromStr for Place {
     type Err = Mistake;
 
     fn from_str(text: &str) -> Result<Self, Mistake> {
-        let parts = text
-            .trim()
-            .strip_prefix("slot ")
-            .and_then(|rest| rest.trim().split_once(' '));
-        let parts = parts.and_then(|(slot, rest)| Some((slot.parse().ok()?, rest)));
-        let Some((slot, address)) = parts else {
+        let words: Vec<&str> = text.split_ascii_whitespace().collect();
+        let parts = match words[..] {
+            ["slot", slot, address] => slot.parse().ok().map(|slot| (slot, None, address)),
+            ["slot", slot, "record", record, address] => {
+                let numbers = slot.parse().ok().zip(record.parse().ok());
+                numbers.map(|(slot, record)| (slot, Some(record), address))
+            }
+            _ => None,
+        };
+        let Some((slot, record, address)) = parts else {
             let what = format!("\"{}\" is no place in a module", shown(text));
             return Err(Mistake::new(what, EXAMPLE));
         };
         Ok(Self {
             slot,
+            record,
             address: Address::parse(address, Addressing::Bytes)?,
         })
     }
@@ -96,11 +115,11 @@ impl Place {
     }
 }
 
-/// A signal's bits in the image, and in the telegram.
+/// A signal's bits in the image, and in the telegram or record.
 #[derive(Clone, Debug, PartialEq, Eq)]
-struct Move {
-    image: usize,
-    wire: Range<usize>,
+pub(crate) struct Move {
+    pub(crate) image: usize,
+    pub(crate) wire: Range<usize>,
 }
 
 /// The positions of the signals of one area of a station in its telegrams.
@@ -124,9 +143,15 @@ impl Layout {
         area: Area,
     ) -> Result<Self, (usize, Mistake)> {
         let mut all: Vec<(Move, &Signal, Option<usize>)> = Vec::new();
+        let mut first = None;
         for signal in signals {
             let image = signal.address().bits();
             let place = places.get(&signal.name);
+            first = first.or(place.map(|(_, at)| *at));
+            // A signal in a record is in no telegram of the exchange.
+            if place.is_some_and(|(place, _)| place.record.is_some()) {
+                continue;
+            }
             let wire = match place {
                 Some((place, at)) => place.bits(modules).map_err(|mistake| (*at, mistake))?,
                 None => image.clone(),
@@ -137,7 +162,7 @@ impl Layout {
             };
             all.push((moved, signal, place.map(|(_, at)| *at)));
         }
-        let Some(first) = all.iter().find_map(|(.., at)| *at) else {
+        let Some(first) = first else {
             return Ok(Self::default());
         };
         let bytes = match area {
@@ -199,10 +224,11 @@ impl Layout {
 }
 
 /// Copies a signal: a bit, or whole bytes.
-fn copy(from: &[u8], source: usize, to: &mut [u8], target: usize, bits: usize) {
+pub(crate) fn copy(from: &[u8], source: usize, to: &mut [u8], target: usize, bits: usize) {
     if bits == 1 {
         let bit = from[source / 8] >> (source % 8) & 1;
-        to[target / 8] |= bit << (target % 8);
+        let octet = &mut to[target / 8];
+        *octet = *octet & !(1 << (target % 8)) | bit << (target % 8);
         return;
     }
     let (source, target, bytes) = (source / 8, target / 8, bits / 8);

@@ -1,10 +1,11 @@
-//! PROFIBUS DP over a serial line: DP-V0 slaves in software.
+//! PROFIBUS DP over a serial line: DP-V0 and DP-V1 slaves in software.
 //!
 //! The core knows no port and no image. [`telegram`] reads and writes telegrams. A [`Station`] is one slave, a function
 //! of its state, the time and a request, to an answer. A [`Segment`] has all stations of a line, and finds the
 //! telegrams among the bytes. An observer takes what a master and its stations exchange off the line, and sends
 //! nothing. A [`Gsd`] is a manufacturer's description of a device.
 
+mod acyclic;
 pub mod advice;
 mod configuration;
 mod device;
@@ -17,11 +18,13 @@ mod observer;
 mod options;
 mod parameters;
 mod rates;
+mod records;
 mod segment;
 mod station;
 pub mod telegram;
 mod user_parameters;
 
+pub use acyclic::{Acyclic, Nameplate, Record, Refusal};
 pub use configuration::{Configuration, SlotModule};
 pub use device::{LineOptions, ProfibusDevice};
 pub use event::{Event, Leaving};

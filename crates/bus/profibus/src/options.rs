@@ -21,8 +21,10 @@ use crate::device::{LineOptions, ProfibusDevice, StationSetup};
 use crate::layout::{Layout, Place};
 use crate::observer::ProfibusObserver;
 use crate::rates::{RATES, Rate, SLOT_TIME_LIMIT};
+use crate::records::{RecordLayout, records};
+use crate::station::Identity;
 pub use station::{Device, StationOptions};
-use station::{check_sizes, read_station};
+use station::{check_sizes, plain_acyclic, read_station};
 
 /// The keys of the line, for the schema of a driver.cfg.
 const KEYS: &[Key] = &[
@@ -212,9 +214,7 @@ impl BusOptions for Options {
 
     fn place(&self, signal: &Signal, _table: &SignalTable) -> String {
         let place = self.places.get(&signal.name);
-        place.map_or_else(String::new, |(place, _)| {
-            format!("slot {} {}", place.slot, place.address)
-        })
+        place.map_or_else(String::new, |(place, _)| place.to_string())
     }
 
     fn read_station(&mut self, _count: usize, table: &mut Table<'_>) {
@@ -240,11 +240,12 @@ impl BusOptions for Options {
 
     fn details(&self, folder: &Path, table: &SignalTable) -> Vec<(String, String)> {
         let table = &table.as_in_plc();
-        let stations = self.stations().zip(&table.stations).enumerate();
-        let details = stations.map(|(index, (station, signals))| {
+        let stations = self.stations().enumerate().take(table.stations.len());
+        let details = stations.map(|(index, station)| {
             let has_places = self.have_places(table, index);
             let line = (!self.observes).then_some(&self.line);
-            station.details(line, folder, signals, has_places)
+            let identity = self.identity(station, folder, table, index).ok()?;
+            station.details(line, folder, &identity, has_places)
         });
         details.flatten().flatten().collect()
     }
@@ -291,7 +292,7 @@ impl Options {
         let stations = self.stations().enumerate().take(table.stations.len());
         stations.map(move |(index, station)| {
             let signals = &table.stations[index];
-            let identity = station.identity(folder, signals)?;
+            let mut identity = station.identity(folder, signals)?;
             let layout = |area| {
                 let own = table.signals.iter();
                 let own = own.filter(|signal| (signal.station, signal.area) == (index, area));
@@ -299,14 +300,81 @@ impl Options {
             };
             let (inputs, outputs) = (layout(Area::Input)?, layout(Area::Output)?);
             station.check_modules(&identity, signals, self.have_places(&table, index))?;
+            let records = self.add_records(station, &table, index, &mut identity)?;
             Ok(StationSetup {
                 address: station.address,
                 identity,
                 inputs,
                 outputs,
+                records,
                 sizes: [signals.input_bytes, signals.output_bytes],
             })
         })
+    }
+
+    /// The identity of a station, with its records.
+    fn identity(
+        &self,
+        station: &StationOptions,
+        folder: &Path,
+        table: &SignalTable,
+        index: usize,
+    ) -> Result<Identity, (usize, Mistake)> {
+        let mut identity = station.identity(folder, &table.stations[index])?;
+        self.add_records(station, table, index, &mut identity)?;
+        Ok(identity)
+    }
+
+    /// Adds the records of a station, and with them the services of a device without a GSD file; returns the positions
+    /// of their signals.
+    fn add_records(
+        &self,
+        station: &StationOptions,
+        table: &SignalTable,
+        index: usize,
+        identity: &mut Identity,
+    ) -> Result<Vec<RecordLayout>, (usize, Mistake)> {
+        if let Device::Plain { ident, .. } = station.device {
+            // Stations of one kind have the same services.
+            let is_same = |(_, other): &(usize, &StationOptions)| matches!(other.device, Device::Plain { ident: of, .. } if of == ident);
+            let mut same = self.stations().enumerate().filter(is_same);
+            if same.any(|(index, other)| self.first_record(other, table, index).is_some()) {
+                identity.dpv1 = true;
+                identity.acyclic = plain_acyclic(&table.stations[index].name);
+            }
+        }
+        if let Some(at) = self.first_record(station, table, index) {
+            station.check_records(identity, at)?;
+        }
+        let own = &mut identity.acyclic;
+        own.nameplate.serial = format!("station {}", station.address);
+        own.send_timeout = send_timeout(self.line.settings.baud);
+        let signals = table.signals.iter();
+        let (slots, room) = (identity.configuration.slots(), own.room());
+        let all = records(
+            &station.records,
+            signals.filter(|signal| signal.station == index),
+            &self.places,
+            slots,
+            room,
+        )?;
+        let (records, layouts) = all.into_iter().unzip();
+        own.records = records;
+        Ok(layouts)
+    }
+
+    /// The offset of a record of the station in the driver.cfg, if there is any.
+    fn first_record(
+        &self,
+        station: &StationOptions,
+        table: &SignalTable,
+        index: usize,
+    ) -> Option<usize> {
+        let fixed = station.records.iter().map(|(_, at)| *at);
+        let signals = table.signals.iter().filter(|own| own.station == index);
+        let places = signals.filter_map(|signal| self.places.get(&signal.name));
+        let places = places.filter(|(place, _)| place.record.is_some());
+        fixed.chain(places.map(|(_, at)| *at)).next()
     }
 
     /// True if any inputs, and any outputs, of a station have their own positions.
@@ -323,6 +391,16 @@ impl Options {
         std::iter::once(&self.common)
             .chain(&self.own)
             .filter_map(Keys::right)
+    }
+}
+
+/// `Send_Timeout` of the connections of other masters, in units of 10 ms: the values that devices with a common chip
+/// have.
+fn send_timeout(baud: u32) -> u16 {
+    match baud {
+        ..500_000 => 400,
+        500_000 => 200,
+        _ => 100,
     }
 }
 

@@ -51,6 +51,11 @@ impl<'a> Parameters<'a> {
         self.watchdog.map(|count| Nanos::from_millis(count * unit))
     }
 
+    /// True if the master uses the acyclic services that come with the parameters.
+    pub(crate) fn enables_dpv1(&self, dpv1: bool) -> bool {
+        dpv1 && self.user.first().is_some_and(|octet| octet & 0x80 != 0)
+    }
+
     /// True if the master signals CLEAR by telegrams without outputs, according to the parameter octets of DPV1.
     pub(crate) fn fail_safe(&self, dpv1: bool) -> bool {
         dpv1 && self.user.first().is_some_and(|octet| octet & 0x40 != 0)

@@ -227,6 +227,7 @@ mod tests {
                 fail_safe: false,
                 dpv1: false,
                 max_diagnosis: DATA_LIMIT,
+                acyclic: crate::Acyclic::default(),
             };
             Station::new(*address, identity)
         };

@@ -1,10 +1,12 @@
-//! A DP-V0 slave: a function of its state, the time and a request, to an answer.
+//! A DP slave: a function of its state, the time and a request, to an answer.
 
+mod acyclic;
 mod diagnosis;
 mod exchange;
 
 use tickbus_base::time::Nanos;
 
+use crate::acyclic::{Acyclic, Server};
 use crate::configuration::Configuration;
 use crate::event::{Event, Leaving};
 use crate::parameters::Parameters;
@@ -47,6 +49,12 @@ pub trait Process {
     /// The master is alive, and the outputs are unchanged.
     fn alive(&mut self, station: u8, now: Nanos);
 
+    /// Fills in those octets of a record that the machine provides; the others stay.
+    fn read_record(&mut self, _station: u8, _now: Nanos, _record: usize, _octets: &mut [u8]) {}
+
+    /// The octets that a master has written into a record.
+    fn wrote_record(&mut self, _station: u8, _now: Nanos, _record: usize, _octets: &[u8]) {}
+
     /// Reports an event of the station.
     fn tell(&mut self, station: u8, now: Nanos, event: Event);
 }
@@ -74,6 +82,8 @@ pub struct Identity {
     pub dpv1: bool,
     /// The most octets of a diagnosis, including the 6 of the standard.
     pub max_diagnosis: usize,
+    /// The acyclic services.
+    pub acyclic: Acyclic,
 }
 
 /// An extended diagnosis.
@@ -96,7 +106,7 @@ pub enum State {
     DataExch,
 }
 
-/// A DP-V0 slave.
+/// A DP slave.
 #[derive(Debug)]
 #[allow(
     clippy::struct_excessive_bools,
@@ -143,6 +153,7 @@ pub struct Station {
     held_since: Nanos,
     /// The last answer to `Data_Exchange` has inputs that the master may not have received.
     is_pending: bool,
+    acyclic: Server,
     last: Last,
 }
 
@@ -172,6 +183,7 @@ enum Answer<'a> {
 impl Station {
     /// The station at `address`, after power-on.
     pub fn new(address: u8, identity: Identity) -> Self {
+        let slots = identity.configuration.slots();
         Self {
             address,
             state: State::WaitPrm,
@@ -200,6 +212,7 @@ impl Station {
             is_held: false,
             held_since: Nanos(0),
             is_pending: false,
+            acyclic: Server::new(&identity.acyclic, slots),
             last: Last::default(),
             identity,
         }
@@ -220,8 +233,13 @@ impl Station {
         self.min_tsdr
     }
 
-    /// When the station acts on its own: the end of the watchdog's time; [`Nanos::MAX`] for never.
+    /// When the station acts on its own: the end of the watchdog's time, or of a master's connection; [`Nanos::MAX`] for
+    /// never.
     pub fn deadline(&self) -> Nanos {
+        self.watchdog_ends().min(self.acyclic.deadline())
+    }
+
+    fn watchdog_ends(&self) -> Nanos {
         match (self.state, self.watchdog) {
             (State::WaitPrm, _) | (_, None) => Nanos::MAX,
             (_, Some(time)) => self.heard + time,
@@ -230,7 +248,8 @@ impl Station {
 
     /// Does what is due at `now`.
     pub fn turn(&mut self, now: Nanos, process: &mut impl Process) {
-        if self.deadline() <= now
+        self.acyclic.turn(now);
+        if self.watchdog_ends() <= now
             && let Some(time) = self.watchdog
         {
             self.leave(now, Leaving::Watchdog(time), process);
@@ -330,7 +349,7 @@ impl Station {
         let exchanges = self.state == State::DataExch;
         let is_owner = self.owner == Some(request.source);
         if request.ssap != Some(sap::MASTER) {
-            return self.append(request, Control::NOT_ACTIVE, &[], reply);
+            return self.serve_acyclic(now, dsap, request, process, reply);
         }
         let mut data = Vec::new();
         let answer = match dsap {
@@ -359,16 +378,21 @@ impl Station {
             Answer::Data(Control::NOT_ACTIVE, _) => {
                 self.append(request, Control::NOT_ACTIVE, &[], reply);
             }
-            Answer::Data(control, data) => Frame {
-                destination: request.source,
-                source: self.address,
-                control,
-                dsap: request.ssap,
-                ssap: request.dsap,
-                data,
-            }
-            .append(reply),
+            Answer::Data(control, data) => self.answer(request, control, data, reply),
         }
+    }
+
+    /// Appends an answer with the access points of the request.
+    fn answer(&self, request: &Frame<'_>, control: Control, data: &[u8], reply: &mut Vec<u8>) {
+        let answer = Frame {
+            destination: request.source,
+            source: self.address,
+            control,
+            dsap: request.ssap,
+            ssap: request.dsap,
+            data,
+        };
+        answer.append(reply);
     }
 
     /// Appends an answer without access points.
@@ -441,6 +465,8 @@ impl Station {
             self.watchdog = watchdog;
             self.fail_safe = self.identity.fail_safe || parameters.fail_safe(self.identity.dpv1);
             self.heard = now;
+            self.acyclic
+                .reset(parameters.enables_dpv1(self.identity.dpv1));
             if self.state == State::WaitPrm {
                 self.owner = Some(master);
                 self.state = State::WaitCfg;
@@ -491,6 +517,7 @@ impl Station {
         self.is_held = false;
         self.outputs.fill(0);
         self.is_cleared = true;
+        self.acyclic.reset(false);
         // An answer of another state is not repeated.
         self.last.head = None;
         process.tell(self.address, now, Event::Left(why));

@@ -62,6 +62,8 @@ pub struct Control(pub u8);
 impl Control {
     /// Answer: positive acknowledgement, no data.
     pub const OK: Self = Self(0x00);
+    /// Answer: no resource for the request.
+    pub const NO_RESOURCE: Self = Self(0x02);
     /// Answer: the service access point is not active.
     pub const NOT_ACTIVE: Self = Self(0x03);
     /// Answer: data.

@@ -5,6 +5,7 @@ use tickbus_base::toml_text::{did_you_mean, shown};
 
 use super::{Gsd, Module};
 use crate::Identity;
+use crate::acyclic::{Acyclic, Nameplate};
 use crate::configuration::{Configuration, hex};
 use crate::telegram::DATA_LIMIT;
 use crate::user_parameters::{LIMIT, UserParameters};
@@ -68,7 +69,31 @@ impl Gsd {
             fail_safe: self.fail_safe,
             dpv1: self.dpv1,
             max_diagnosis: self.max_diagnosis.unwrap_or(DATA_LIMIT),
+            acyclic: self.acyclic(),
         })
+    }
+
+    /// The acyclic services of the device, without records.
+    fn acyclic(&self) -> Acyclic {
+        let (class_1, class_2) = (self.c1_read_write, self.c2_read_write);
+        let rooms = [(class_1, self.c1_max_data), (class_2, self.c2_max_data)];
+        let rooms = rooms
+            .into_iter()
+            .filter_map(|(is_there, room)| (is_there && room > 0).then_some(room));
+        Acyclic {
+            class_1,
+            connections: if class_2 { self.c2_channels.max(1) } else { 0 },
+            max_data: rooms.min().unwrap_or(0),
+            nameplate: Nameplate {
+                order: if self.order.is_empty() {
+                    self.model.clone()
+                } else {
+                    self.order.clone()
+                },
+                ..Nameplate::default()
+            },
+            ..Acyclic::default()
+        }
     }
 
     fn modules(&self, chosen: &[String]) -> Result<Vec<&Module>, Mistake> {

@@ -101,6 +101,12 @@ impl Reader<'_> {
             "fail_safe" => gsd.fail_safe = flag(values)?,
             "set_slave_add_supp" => gsd.set_slave_add = flag(values)?,
             "dpv1_slave" => gsd.dpv1 = flag(values)?,
+            "ordernumber" => gsd.order = values.quoted()?,
+            "c1_read_write_supp" => gsd.c1_read_write = flag(values)?,
+            "c1_max_data_len" => gsd.c1_max_data = octet(values)?,
+            "c2_read_write_supp" => gsd.c2_read_write = flag(values)?,
+            "c2_max_data_len" => gsd.c2_max_data = octet(values)?,
+            "c2_max_count_channels" => gsd.c2_channels = octet(values)?,
             "unit_diag_bit" => {
                 let bit = index_of(index, values)?;
                 gsd.diagnosis.bits.insert(bit, values.quoted()?);
@@ -402,6 +408,12 @@ fn flag(mut values: Values<'_>) -> Result<bool, GsdError> {
     let flag = values.number()? != 0;
     values.end()?;
     Ok(flag)
+}
+
+fn octet(mut values: Values<'_>) -> Result<u8, GsdError> {
+    let octet = values.octet()?;
+    values.end()?;
+    Ok(octet)
 }
 
 /// A number of octets or modules.

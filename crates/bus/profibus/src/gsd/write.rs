@@ -11,6 +11,9 @@ const NAME_LIMIT: usize = 32;
 /// Higher rates are not for software behind a serial port.
 const SOFTWARE_LIMIT: u32 = 500_000;
 
+/// The time for the answer to a request for a record, in units of 10 ms: an answer is ready at once.
+const RESPONSE: u16 = 10;
+
 /// A kind of device that no maker has described.
 pub(crate) struct Machine<'a> {
     /// The name.
@@ -58,7 +61,14 @@ impl Machine<'_> {
                 names.join("; ")
             ));
         }
-        line("GSD_Revision=3");
+        // All stations of one kind have the same services.
+        let acyclic = &own.acyclic;
+        // Revision 5 has the keywords of DP-V1 and of the nameplate.
+        line(if acyclic.is_any() {
+            "GSD_Revision=5"
+        } else {
+            "GSD_Revision=3"
+        });
         line("Vendor_Name=\"tickbus\"");
         line(&format!("Model_Name=\"{model}\""));
         line("Revision=\"V1.0\"");
@@ -93,7 +103,26 @@ impl Machine<'_> {
         line("Min_Slave_Intervall=10");
         line(&format!("Max_Diag_Data_Len={DATA_LIMIT}"));
         line("Slave_Family=3");
-        line("User_Prm_Data_Len=0");
+        if acyclic.is_any() {
+            // The octets of DPV1; the first enables the acyclic services.
+            line("User_Prm_Data_Len=3");
+            line("Ext_User_Prm_Data_Const(0)=0x80,0x00,0x00");
+            line("Max_User_Prm_Data_Len=3");
+            line("DPV1_Slave=1");
+            line("WD_Base_1ms_supp=1");
+            line("C1_Read_Write_supp=1");
+            line(&format!("C1_Max_Data_Len={}", acyclic.room()));
+            // In units of 10 ms.
+            line(&format!("C1_Response_Timeout={RESPONSE}"));
+            line("C2_Read_Write_supp=1");
+            line(&format!("C2_Max_Data_Len={}", acyclic.room()));
+            line(&format!("C2_Response_Timeout={RESPONSE}"));
+            line(&format!("C2_Max_Count_Channels={}", acyclic.connections));
+            line(&format!("Max_Initiate_PDU_Length={DATA_LIMIT}"));
+            line("Ident_Maintenance_supp=1");
+        } else {
+            line("User_Prm_Data_Len=0");
+        }
         line("Modular_Station=1");
         let most = |of: fn(&Identity) -> usize| {
             let counts = self.stations.iter().map(|(.., identity)| of(identity));
@@ -194,6 +223,7 @@ mod tests {
             fail_safe: false,
             dpv1: false,
             max_diagnosis: 244,
+            acyclic: crate::Acyclic::default(),
         };
         let modules = [0x50, 0x60, 0x50, 0x93, 0xC1, 0x43, 0x81, 0xAA];
         let conveyor = own(Configuration::of_bytes(&modules).expect("whole"));

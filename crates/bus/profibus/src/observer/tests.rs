@@ -16,6 +16,7 @@ fn identity(config: &[u8]) -> Identity {
         fail_safe: false,
         dpv1: false,
         max_diagnosis: 244,
+        acyclic: crate::Acyclic::default(),
     }
 }
 

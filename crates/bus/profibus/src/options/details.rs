@@ -4,12 +4,13 @@ use std::ops::Range;
 use std::path::Path;
 
 use tickbus_base::toml_text::shown;
-use tickbus_image::signal::{self, Area};
+use tickbus_image::signal::Area;
 
 use super::station::read_gsd;
 use super::{Device, StationOptions};
 use crate::configuration::{SlotModule, hex};
 use crate::device::LineOptions;
+use crate::station::Identity;
 
 impl StationOptions {
     /// The lines, each with its heading; `None` for a station with mistakes. `line` is the line of a device, which
@@ -18,10 +19,9 @@ impl StationOptions {
         &self,
         line: Option<&LineOptions>,
         folder: &Path,
-        signals: &signal::Station,
+        identity: &Identity,
         has_places: [bool; 2],
     ) -> Option<Vec<(String, String)>> {
-        let identity = self.identity(folder, signals).ok()?;
         let mut lines = Vec::new();
         let mut put = |head: &str, text: String| lines.push((head.to_owned(), text));
         let (address, ident) = (self.address, identity.ident);
@@ -55,6 +55,24 @@ impl StationOptions {
             for (slot, module) in (1..).zip(identity.configuration.modules()) {
                 put(&format!("slot {slot}"), in_words(module, has_places));
             }
+        }
+        for record in &identity.acyclic.records {
+            let (count, plural) = (
+                record.octets.len(),
+                if record.octets.len() == 1 { "" } else { "s" },
+            );
+            let access = if record.is_writable {
+                "read and written"
+            } else {
+                "read"
+            };
+            put(
+                "record",
+                format!(
+                    "{} of slot {}: {count} octet{plural}, {access}",
+                    record.index, record.slot
+                ),
+            );
         }
         let defaults = identity.user.defaults();
         if !defaults.is_empty() {

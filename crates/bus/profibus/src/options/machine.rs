@@ -20,7 +20,7 @@ impl Options {
     ) -> Result<String, Mistake> {
         let mut stations = Vec::new();
         let mut idents: Vec<u16> = Vec::new();
-        for (station, signals) in self.stations().zip(&table.stations) {
+        for (index, (station, signals)) in self.stations().zip(&table.stations).enumerate() {
             let Device::Plain {
                 ident: own,
                 configuration,
@@ -32,7 +32,9 @@ impl Options {
                 idents.push(*own);
             }
             if ident.is_none_or(|asked| asked == *own) {
-                let identity = super::station::plain(*own, configuration.as_ref(), signals);
+                let mut identity = super::station::plain(*own, configuration.as_ref(), signals);
+                let records = self.add_records(station, table, index, &mut identity);
+                records.map_err(|(_, mistake)| mistake)?;
                 stations.push((station.address, signals.name.as_str(), identity));
             }
         }

@@ -8,8 +8,10 @@ use tickbus_base::toml_text::{Key, Shape, Table, Value};
 use tickbus_image::signal;
 
 use super::Keys;
+use crate::acyclic::{Acyclic, Nameplate};
 use crate::configuration::Configuration;
 use crate::gsd::Gsd;
+use crate::records::Fixed;
 use crate::station::Identity;
 use crate::telegram::DATA_LIMIT;
 use crate::user_parameters::UserParameters;
@@ -22,6 +24,12 @@ const NAME_LIMIT: usize = 200;
 
 /// The most modules of a station.
 const MODULE_LIMIT: usize = 244;
+
+/// The longest text of a record, in characters.
+const RECORD_TEXT_LIMIT: usize = 1000;
+
+/// The most records of a station.
+const RECORDS_LIMIT: usize = 1000;
 
 /// A GSD file is at most this long, in bytes.
 const GSD_LIMIT: u64 = 16 << 20;
@@ -49,6 +57,11 @@ pub(crate) const KEYS: &[Key] = &[
         "Instead of a GSD file: the number of the kind of device",
     ),
     Key::new(
+        "records",
+        Shape::List(&Shape::Label(RECORD_TEXT_LIMIT), 1, RECORDS_LIMIT),
+        "Records with octets, such as \"slot 2 record 10 = 00 64\"",
+    ),
+    Key::new(
         "config",
         Shape::List(&Shape::Whole(0, 255), 1, DATA_LIMIT),
         "Beside \"ident\": the identifiers of the modules",
@@ -65,6 +78,7 @@ pub(crate) const OWN_KEYS: &[Key] = &[
     KEYS[2],
     KEYS[3],
     KEYS[4],
+    KEYS[5],
 ];
 
 /// The keys of one station.
@@ -74,6 +88,8 @@ pub struct StationOptions {
     pub address: u8,
     /// The device.
     pub device: Device,
+    /// The records with their octets, each with its offset.
+    pub(super) records: Vec<(Fixed, usize)>,
     /// The offset of the address, and the line.
     pub(super) at: usize,
     pub(super) line: usize,
@@ -143,6 +159,37 @@ impl StationOptions {
             } => Ok(plain(*ident, configuration.as_ref(), signals)),
         }
     }
+
+    /// Checks that the device has records; `at` is the offset of the first.
+    pub(super) fn check_records(
+        &self,
+        identity: &Identity,
+        at: usize,
+    ) -> Result<(), (usize, Mistake)> {
+        if identity.acyclic.is_any() {
+            return Ok(());
+        }
+        let what = format!(
+            "station {}: the device has no records: its GSD file has neither C1_Read_Write_supp=1 nor \
+             C2_Read_Write_supp=1",
+            self.address
+        );
+        let right = "remove the record, or take the GSD file of a device with DP-V1";
+        Err((at, Mistake::new(what, right)))
+    }
+}
+
+/// The acyclic services of a device without a GSD file: all, with two connections of other masters.
+pub(super) fn plain_acyclic(name: &str) -> Acyclic {
+    Acyclic {
+        class_1: true,
+        connections: 2,
+        nameplate: Nameplate {
+            order: name.to_owned(),
+            ..Nameplate::default()
+        },
+        ..Acyclic::default()
+    }
 }
 
 impl StationOptions {
@@ -184,6 +231,7 @@ pub(super) fn plain(
         fail_safe: false,
         dpv1: false,
         max_diagnosis: DATA_LIMIT,
+        acyclic: Acyclic::default(),
     }
 }
 
@@ -221,7 +269,8 @@ pub(super) fn read_station(table: &mut Table<'_>, is_required: bool) -> Keys {
     let modules = table.take("modules");
     let ident = table.take("ident");
     let config = table.take("config");
-    let others = [&gsd, &modules, &ident, &config];
+    let records = table.take("records");
+    let others = [&gsd, &modules, &ident, &config, &records];
     if !is_required && address.is_none() {
         let Some(stray) = others.into_iter().flatten().next() else {
             return Keys::Absent;
@@ -287,10 +336,12 @@ pub(super) fn read_station(table: &mut Table<'_>, is_required: bool) -> Keys {
             None
         }
     };
-    match (address, device) {
-        (Some(address), Some(device)) => Keys::Right(StationOptions {
+    let records = records.map_or(Some(Vec::new()), |value| read_records(&value));
+    match (address, device, records) {
+        (Some(address), Some(device), Some(records)) => Keys::Right(StationOptions {
             address,
             device,
+            records,
             at,
             line,
             gsd_at,
@@ -314,6 +365,28 @@ fn read_modules(value: &Value<'_>) -> Option<Vec<String>> {
         .iter()
         .map(|name| name.label(NAME_LIMIT, right).map(str::to_owned));
     names.collect()
+}
+
+fn read_records(value: &Value<'_>) -> Option<Vec<(Fixed, usize)>> {
+    let right = "write the records, such as [\"slot 2 record 10 = 00 64\"]";
+    let texts = value.list(right)?;
+    if texts.len() > RECORDS_LIMIT {
+        value.wrong(
+            format!("there are {} records", texts.len()),
+            format!("a station has at most {RECORDS_LIMIT}"),
+        );
+        return None;
+    }
+    let read = |text: &Value<'_>| match text.label(RECORD_TEXT_LIMIT, right)?.parse() {
+        Ok(record) => Some((record, text.at())),
+        Err(mistake) => {
+            text.refuse(mistake);
+            None
+        }
+    };
+    // All mistakes are reported, not only the first.
+    let records: Vec<_> = texts.iter().map(read).collect();
+    records.into_iter().collect()
 }
 
 fn read_config(value: &Value<'_>) -> Option<Configuration> {

@@ -69,6 +69,7 @@ fn identity() -> Identity {
         fail_safe: false,
         dpv1: false,
         max_diagnosis: DATA_LIMIT,
+        acyclic: Acyclic::default(),
     }
 }
 

@@ -77,6 +77,7 @@ impl Rig {
             fail_safe: false,
             dpv1: false,
             max_diagnosis: DATA_LIMIT,
+            acyclic: tickbus_bus_profibus::Acyclic::default(),
         };
         let mut rig = Self {
             segment: Segment::new(500_000, vec![Station::new(STATION, identity)]),

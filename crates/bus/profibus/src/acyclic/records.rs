@@ -1,0 +1,151 @@
+//! The records of a station, and the requests to read and write them.
+
+use super::identification::{INDEX, Identification, Nameplate};
+use super::pdu::{Refusal, function, refuse};
+
+/// A block of octets that masters read, and may write.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Record {
+    /// The slot; 0 is the device itself.
+    pub slot: u8,
+    /// The index, 0 to 254.
+    pub index: u8,
+    /// The octets at power-on, 1 to 240.
+    pub octets: Vec<u8>,
+    /// Masters may write the record.
+    pub is_writable: bool,
+}
+
+/// The machine behind the records.
+pub(crate) trait Machine {
+    /// Fills in the octets of the record that the machine provides; the others stay.
+    fn read(&mut self, record: usize, octets: &mut [u8]);
+
+    /// A master has written these octets into the record.
+    fn written(&mut self, record: usize, octets: &[u8]);
+
+    /// A master's request for a record was refused.
+    fn refused(&mut self, writes: bool, slot: u8, index: u8, why: Refusal);
+}
+
+/// The part of record 255 that a master has named before it reads the record.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Called(Option<(u8, u16)>);
+
+/// The records.
+#[derive(Debug)]
+pub(super) struct Records {
+    all: Vec<Record>,
+    identification: Identification,
+    /// The highest slot.
+    slots: u8,
+}
+
+impl Records {
+    pub(super) fn new(all: Vec<Record>, nameplate: &Nameplate, slots: u8) -> Self {
+        Self {
+            all,
+            identification: Identification::new(nameplate),
+            slots,
+        }
+    }
+
+    /// Serves a request; returns the answer.
+    pub(super) fn serve(
+        &mut self,
+        request: &[u8],
+        called: &mut Called,
+        machine: &mut impl Machine,
+    ) -> Vec<u8> {
+        let mut answer = Vec::new();
+        let service = request[0];
+        let served = match *request {
+            [function::READ, slot, index, length] if length > 0 => {
+                self.read(slot, index, length, *called, machine, &mut answer)
+            }
+            [function::WRITE, slot, index, length, ref data @ ..] if length > 0 => {
+                if data.len() == length.into() {
+                    self.write(slot, index, data, called, machine)
+                        .map(|()| answer.extend([service, slot, index, length]))
+                } else {
+                    Err(Refusal::Length)
+                }
+            }
+            [function::READ | function::WRITE, ..] => Err(Refusal::Form),
+            _ => Err(Refusal::NotSupported),
+        };
+        if let Err(why) = served {
+            if let [function::READ | function::WRITE, slot, index, ..] = *request {
+                machine.refused(service == function::WRITE, slot, index, why);
+            }
+            refuse(service, why, &mut answer);
+        }
+        answer
+    }
+
+    fn read(
+        &self,
+        slot: u8,
+        index: u8,
+        length: u8,
+        Called(called): Called,
+        machine: &mut impl Machine,
+        answer: &mut Vec<u8>,
+    ) -> Result<(), Refusal> {
+        let mut octets = if index == INDEX {
+            self.check_slot(slot)?;
+            match called {
+                Some((of, part)) if of == slot => self.identification.read(part)?,
+                _ => return Err(Refusal::State),
+            }
+        } else {
+            let own = self.position(slot, index)?;
+            let mut octets = self.all[own].octets.clone();
+            machine.read(own, &mut octets);
+            octets
+        };
+        octets.truncate(length.into());
+        let length = u8::try_from(octets.len()).expect("a record has at most 240 octets");
+        answer.extend([function::READ, slot, index, length]);
+        answer.append(&mut octets);
+        Ok(())
+    }
+
+    fn write(
+        &mut self,
+        slot: u8,
+        index: u8,
+        data: &[u8],
+        Called(called): &mut Called,
+        machine: &mut impl Machine,
+    ) -> Result<(), Refusal> {
+        if index == INDEX {
+            self.check_slot(slot)?;
+            *called = None;
+            *called = Some((slot, self.identification.call(data)?));
+            return Ok(());
+        }
+        let own = self.position(slot, index)?;
+        let record = &mut self.all[own];
+        if !record.is_writable {
+            return Err(Refusal::Access);
+        }
+        if record.octets.len() != data.len() {
+            return Err(Refusal::Length);
+        }
+        record.octets.copy_from_slice(data);
+        machine.written(own, data);
+        Ok(())
+    }
+
+    fn check_slot(&self, slot: u8) -> Result<(), Refusal> {
+        (slot <= self.slots).then_some(()).ok_or(Refusal::Slot)
+    }
+
+    fn position(&self, slot: u8, index: u8) -> Result<usize, Refusal> {
+        self.check_slot(slot)?;
+        let mut all = self.all.iter();
+        all.position(|own| (own.slot, own.index) == (slot, index))
+            .ok_or(Refusal::Index)
+    }
+}

@@ -32,7 +32,7 @@ mod core {
 
     use tickbus::fieldbus::profibus::telegram::{Control, DATA_LIMIT, Frame};
     use tickbus::fieldbus::profibus::{
-        Configuration, Event, Identity, Process, Segment, State, Station, UserParameters,
+        Acyclic, Configuration, Event, Identity, Process, Segment, State, Station, UserParameters,
     };
     use tickbus::time::Nanos;
 

@@ -28,6 +28,11 @@ fn main() -> ExitCode {
                 "pyprofibus_takes_our_gsd_files_exchanges_and_reads_diagnoses_at_every_rate_of_user_space",
                 exchanges,
             ),
+            #[cfg(unix)]
+            (
+                "pyprofibus_carries_requests_for_records_while_it_exchanges_data",
+                records,
+            ),
         ],
     )])
 }
@@ -96,6 +101,88 @@ fn exchanges() -> Result<(), Absent> {
         assert_eq!(last[12..14], *"80", "{told}");
         println!("{baud} baud, {module}: {}", told.trim());
     }
+    Ok(())
+}
+
+/// Signals and fixed octets in records, of a machine whose GSD file is ours.
+#[cfg(unix)]
+fn records() -> Result<(), Absent> {
+    const SCRIPT: &str = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/tests/peers/profibus_records.py"
+    );
+    let folder = tempfile::tempdir().expect("a folder");
+    let own = folder.path().join("own.gsd");
+    let own = own.to_str().expect("UTF-8");
+    let mut master = foreign::python_with("main", &["pyprofibus", "serial"])?;
+    let line = pty::Line::new();
+    let port = line.end(0).display();
+    let text = format!(
+        "[driver]\nid = 1\nname = \"Drive 4\"\n[fieldbus]\nkind = \"profibus-device\"\ndevice = \"{port}\"\n\
+         baud = 500000\nmax_tsdr = 16000\nmax_age = \"5s\"\naddress = 8\n\
+         ident = 0x80E1\nconfig = [0xF1]\nrecords = [\"slot 0 record 10 = 01 02\"]\n\
+         [[signal]]\nname = \"out\"\naddress = \"%QD0\"\ntype = \"UDINT\"\n\
+         [[signal]]\nname = \"in\"\naddress = \"%ID0\"\ntype = \"UDINT\"\n\
+         [[signal]]\nname = \"ramp\"\naddress = \"%QW4\"\ntype = \"INT\"\n\
+         [[signal]]\nname = \"warmth\"\naddress = \"%IW4\"\ntype = \"INT\"\n\
+         [[signal]]\nname = \"warm\"\naddress = \"%IX6.0\"\n\
+         [fieldbus.at]\nramp = \"slot 1 record 10 %QW0\"\nwarmth = \"slot 1 record 11 %IW0\"\n\
+         warm = \"slot 1 record 11 %IX2.7\"\n"
+    );
+    write_gsd(folder.path(), &text, own);
+    let mut machine = Machine::open(&text);
+    machine.until("it listens", |machine| {
+        statistic(&machine.driver, "device").is_some()
+    });
+    master.arg(SCRIPT).arg(line.end(1));
+    master.args(["500000", "8", own, "2 words in and out, consistent"]);
+    let ramps = std::cell::RefCell::new(Vec::new());
+    let told = machine.until_the_end_of(master, |machine| {
+        machine.tick();
+        let value = machine.get("out");
+        machine.set("in", value);
+        machine.set("warmth", 300.0);
+        machine.set("warm", 1.0);
+        let ramp = machine.get("ramp");
+        let mut ramps = ramps.borrow_mut();
+        if ramps.last() != Some(&ramp) {
+            ramps.push(ramp);
+        }
+    });
+    let initiate = "5700000000640100000000000002000200000000";
+    let expected = [
+        "5e010af0 5e010a020000".to_owned(),
+        "5f010a021234 5f010a02".to_owned(),
+        "5e010af0 5e010a021234".to_owned(),
+        "5e010bf0 5e010b03012c80".to_owned(),
+        "5e010cf0 de80b000".to_owned(),
+        "5e050af0 de80b200".to_owned(),
+        "5f010a0112 df80b100".to_owned(),
+        "5f000a020102 5f000a02".to_owned(),
+        "5f00ff040800fde8 5f00ff04".to_owned(),
+        // I&M0: "ident 80E1", "station 8".
+        "5e00ff44 5e00ff440800fde80000000000000000000000006964656e7420383045312020202020202020202073746174696f6e20382020\
+         20202020200001560100000000f60000000101000e"
+            .to_owned(),
+        format!("{initiate} 563000c8"),
+        "57f00100000000000002000200000000".to_owned(),
+        format!("{initiate} 562f00c8"),
+        "57f00100000000000002000200000000".to_owned(),
+        format!("{initiate} rr"),
+        "5e010af0 5e010a021234".to_owned(),
+        "5f010a025678 5f010a02".to_owned(),
+        "48 48".to_owned(),
+        "5101010101 d180a900".to_owned(),
+        "580020 rs".to_owned(),
+        "5e010af0 rs".to_owned(),
+        "profibus_records: ok".to_owned(),
+    ];
+    let expected = expected.join("\n");
+    assert!(told.contains(&expected), "expected {expected}\ntold {told}");
+    assert_eq!(
+        ramps.into_inner(),
+        [0.0, f64::from(0x1234), f64::from(0x5678)]
+    );
     Ok(())
 }
 

@@ -7,7 +7,9 @@
 use libfuzzer_sys::fuzz_target;
 use tickbus_base::time::Nanos;
 use tickbus_bus_profibus::telegram::{DATA_LIMIT, Telegram};
-use tickbus_bus_profibus::{Configuration, Diagnosed, Event, Gsd, Identity, Process, Segment, Station, UserParameters};
+use tickbus_bus_profibus::{
+    Acyclic, Configuration, Diagnosed, Event, Gsd, Identity, Nameplate, Process, Record, Segment, Station, UserParameters,
+};
 
 fuzz_target!(|data: &[u8]| {
     let Some((first, rest)) = data.split_first() else {
@@ -69,6 +71,24 @@ fn line(dpv1: bool, mut stream: &[u8]) {
     }
 }
 
+/// Both kinds of connections, to a record that is written and one that is read.
+fn acyclic() -> Acyclic {
+    let record = |index, is_writable| Record {
+        slot: 1,
+        index,
+        octets: vec![index; 240],
+        is_writable,
+    };
+    Acyclic {
+        class_1: true,
+        connections: 2,
+        max_data: 240,
+        send_timeout: 1,
+        records: vec![record(0, true), record(1, false)],
+        nameplate: Nameplate::default(),
+    }
+}
+
 struct Machine;
 
 impl Process for Machine {
@@ -84,6 +104,15 @@ impl Process for Machine {
     }
 
     fn alive(&mut self, _: u8, _: Nanos) {}
+
+    fn read_record(&mut self, _: u8, now: Nanos, record: usize, octets: &mut [u8]) {
+        assert!(record < 2 && octets.len() == 240);
+        octets[0] = now.0.to_le_bytes()[1];
+    }
+
+    fn wrote_record(&mut self, _: u8, _: Nanos, record: usize, octets: &[u8]) {
+        assert!(record == 0 && octets.len() == 240);
+    }
 
     fn tell(&mut self, _: u8, _: Nanos, event: Event) {
         if let Event::Left(why) = event {

@@ -340,7 +340,7 @@ impl Options {
             let mut same = self.stations().enumerate().filter(is_same);
             if same.any(|(index, other)| self.first_record(other, table, index).is_some()) {
                 identity.dpv1 = true;
-                identity.acyclic = plain_acyclic(&table.stations[index].name);
+                identity.acyclic = plain_acyclic(&format!("ident {ident:04X}"));
             }
         }
         if let Some(at) = self.first_record(station, table, index) {

@@ -28,9 +28,9 @@ impl FromStr for Fixed {
                 return None;
             };
             let octets = octets.split_ascii_whitespace();
-            let octets = octets.map(|octet| match octet.len() {
-                2 => u8::from_str_radix(octet, 16).ok(),
-                _ => None,
+            let octets = octets.map(|octet| {
+                let is_hex = octet.len() == 2 && octet.bytes().all(|c| c.is_ascii_hexdigit());
+                is_hex.then(|| u8::from_str_radix(octet, 16).ok()).flatten()
             });
             Some(Record {
                 slot: slot.parse().ok()?,
@@ -169,4 +169,123 @@ pub(crate) fn records<'s>(
         }
     }
     Ok(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tickbus_image::signal::{Address, DataType};
+
+    fn signal(name: &str, address: &str, data_type: DataType) -> Signal {
+        let address: Address = address.parse().expect("right");
+        let mut signal = Signal::new(name, address.area, address.byte, data_type);
+        signal.bit = address.bit;
+        signal
+    }
+
+    fn fixed(text: &str) -> (Fixed, usize) {
+        (text.parse().expect("a record"), 7)
+    }
+
+    fn read(
+        own: &[(Fixed, usize)],
+        signals: &[Signal],
+        places: &[&str],
+    ) -> Result<Vec<(Record, RecordLayout)>, (usize, Mistake)> {
+        let places = signals.iter().zip(places).enumerate();
+        let places = places.map(|(at, (signal, place))| {
+            (signal.name.clone(), (place.parse().expect("a place"), at))
+        });
+        records(own, signals.iter(), &places.collect(), 2, 4)
+    }
+
+    #[test]
+    fn signals_share_records_with_each_other_and_with_fixed_octets() {
+        let signals = [
+            signal("ramp", "%QW4", DataType::Int),
+            signal("on", "%QX6.1", DataType::Bool),
+            signal("warm", "%IX2.0", DataType::Bool),
+            signal("warmth", "%IW0", DataType::Int),
+        ];
+        let places = [
+            "slot 1 record 10 %QW0",
+            "slot 1 record 10 %QX2.7",
+            "slot 1 record 10 %IX2.0",
+            "slot 2 record 10 %IW0",
+        ];
+        let own = [
+            fixed("slot 1 record 10 = 00 64 FF AA"),
+            fixed("slot 0 record 0 = 01"),
+        ];
+        let all = read(&own, &signals, &places).expect("right");
+        let [(first, layout), (second, _), (third, inputs)] = &all[..] else {
+            panic!("{all:?}");
+        };
+        assert_eq!((first.octets.len(), first.is_writable), (4, true));
+        assert_eq!((&second.octets[..], second.is_writable), (&[1][..], true));
+        assert_eq!((&third.octets[..], third.is_writable), (&[0, 0][..], false));
+        let mut octets = first.octets.clone();
+        layout.fill(&[0, 0, 0], &mut octets);
+        assert_eq!(octets, [0, 0x64, 0xFE, 0xAA], "the bit of the input");
+        let mut frame = [0xFF; 7];
+        layout.take(&[1, 2, 0x80, 0], &mut frame);
+        assert_eq!(frame, [0xFF, 0xFF, 0xFF, 0xFF, 1, 2, 0xFF]);
+        layout.take(&[1, 2, 0x7F, 0], &mut frame);
+        assert_eq!(frame[6], 0xFD);
+        let mut octets = third.octets.clone();
+        inputs.fill(&[5, 6], &mut octets);
+        assert_eq!(octets, [5, 6]);
+    }
+
+    #[test]
+    fn mistakes_are_told_at_their_place() {
+        let signals = [
+            signal("ramp", "%QW4", DataType::Int),
+            signal("warmth", "%IW0", DataType::Int),
+        ];
+        let first = "slot 1 record 10 %QW0";
+        for (place, what) in [
+            (
+                "slot 1 record 10 %IW1",
+                "\"ramp\" is in the same bits of the record",
+            ),
+            ("slot 3 record 10 %IW0", "the station has no slot 3"),
+            ("slot 300 record 10 %IW0", "the station has no slot 300"),
+            (
+                "slot 1 record 255 %IW0",
+                "record 255 is the device's nameplate",
+            ),
+            ("slot 1 record 11 %IW3", "the record would have 5 octets"),
+        ] {
+            let (at, mistake) = read(&[], &signals, &[first, place]).expect_err(place);
+            assert_eq!((at, &*mistake.what), (1, what));
+        }
+        for (texts, what) in [
+            (&["slot 3 record 1 = 01"][..], "the station has no slot 3"),
+            (
+                &["slot 1 record 1 = 01", "slot 1 record 1 = 02"],
+                "slot 1 has record 1 twice",
+            ),
+            (
+                &["slot 1 record 1 = 01 02 03 04 05"],
+                "the record would have 5 octets",
+            ),
+        ] {
+            let own: Vec<_> = texts.iter().map(|text| fixed(text)).collect();
+            let (at, mistake) = read(&own, &[], &[]).expect_err("wrong");
+            assert_eq!((at, &*mistake.what), (7, what));
+        }
+        for text in [
+            "",
+            "slot 1 record 1",
+            "slot 1 record 1 =",
+            "slot 1 record 256 = 01",
+            "slot 1 record 1 = 1",
+            "slot 1 record 1 = +1",
+            "slot 1 record 1 = 01,02",
+            "record 1 slot 1 = 01",
+        ] {
+            assert!(text.parse::<Fixed>().is_err(), "{text}");
+        }
+    }
 }

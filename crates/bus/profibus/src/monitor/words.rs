@@ -45,7 +45,7 @@ fn service_at(slaves: Option<u8>) -> Service {
         Some(sap::RD_OUTP) => Service::Other("RD_Outp"),
         Some(55) => Service::Other("Set_Slave_Add"),
         Some(53) => Service::Other("Set_Ext_Prm"),
-        Some(50 | 51) => Service::Other("DP-V1"),
+        Some(0..=51) => Service::Other("DP-V1"),
         Some(_) => Service::Other("another service"),
     }
 }

@@ -8,7 +8,7 @@ use libfuzzer_sys::fuzz_target;
 use tickbus_base::time::Nanos;
 use tickbus_bus_profibus::telegram::{DATA_LIMIT, Telegram};
 use tickbus_bus_profibus::{
-    Acyclic, Configuration, Diagnosed, Event, Gsd, Identity, Nameplate, Process, Record, Segment, Station, UserParameters,
+    Acyclic, Configuration, Diagnosed, DriveParameter, Event, Format, Gsd, Identity, Nameplate, Process, Record, Segment, Station, UserParameters,
 };
 
 fuzz_target!(|data: &[u8]| {
@@ -85,6 +85,13 @@ fn acyclic() -> Acyclic {
         max_data: 240,
         send_timeout: 1,
         records: vec![record(0, true), record(1, false)],
+        parameters: vec![DriveParameter {
+            number: 945,
+            format: Format::Unsigned16,
+            is_array: true,
+            octets: vec![0; 16],
+            is_writable: true,
+        }],
         nameplate: Nameplate::default(),
     }
 }
@@ -106,12 +113,12 @@ impl Process for Machine {
     fn alive(&mut self, _: u8, _: Nanos) {}
 
     fn read_record(&mut self, _: u8, now: Nanos, record: usize, octets: &mut [u8]) {
-        assert!(record < 2 && octets.len() == 240);
+        assert_eq!(octets.len(), if record < 2 { 240 } else { 16 });
         octets[0] = now.0.to_le_bytes()[1];
     }
 
     fn wrote_record(&mut self, _: u8, _: Nanos, record: usize, octets: &[u8]) {
-        assert!(record == 0 && octets.len() == 240);
+        assert!((record, octets.len()) == (0, 240) || (record, octets.len()) == (2, 16));
     }
 
     fn tell(&mut self, _: u8, _: Nanos, event: Event) {

@@ -5,16 +5,20 @@
 //! records.
 
 mod class2;
+mod drive;
 mod identification;
+mod machine;
 mod pdu;
 mod records;
 
 use tickbus_base::time::Nanos;
 
 use class2::Connections;
+pub(crate) use drive::{ELEMENT_LIMIT, INDEX as PARAMETERS};
+pub use drive::{Format, Parameter};
 pub use identification::Nameplate;
+pub(crate) use machine::Machine;
 pub use pdu::Refusal;
-pub(crate) use records::Machine;
 pub use records::Record;
 use records::{Called, Records};
 
@@ -43,6 +47,8 @@ pub struct Acyclic {
     pub send_timeout: u16,
     /// The records, by slot and index, without repetitions.
     pub records: Vec<Record>,
+    /// The parameters of a drive, without repetitions.
+    pub parameters: Vec<Parameter>,
     /// The nameplate that masters read as record 255 (I&M).
     pub nameplate: Nameplate,
 }
@@ -97,7 +103,7 @@ impl Server {
             answer: Vec::new(),
             called: Called::default(),
             connections: Connections::new(own.connections, own.send_timeout),
-            records: Records::new(own.records.clone(), &own.nameplate, slots),
+            records: Records::new(own, slots),
         }
     }
 

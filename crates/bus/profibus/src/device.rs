@@ -107,8 +107,10 @@ impl Stations {
             outputs: setup.outputs.clone(),
             frame: vec![0; port.sizes(index).1],
             records: {
-                let records = setup.identity.acyclic.records.iter();
-                let octets = records.map(|record| record.octets.clone());
+                let own = &setup.identity.acyclic;
+                let records = own.records.iter().map(|record| record.octets.clone());
+                let parameters = own.parameters.iter().map(|own| own.octets.clone());
+                let octets = records.chain(parameters);
                 setup.records.iter().cloned().zip(octets).collect()
             },
             is_written: false,

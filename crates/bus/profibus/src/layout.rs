@@ -7,29 +7,47 @@ use std::str::FromStr;
 
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::shown;
-use tickbus_image::signal::{Address, Addressing, Area, Signal};
+use tickbus_image::signal::{Address, Addressing, Area, DataType, Signal};
 
+use crate::acyclic::{ELEMENT_LIMIT, Format};
 use crate::configuration::Configuration;
 
-const EXAMPLE: &str = "write the slot and the address in its module, such as \"slot 2 %IW0\", or in one of its records, \
-                       such as \"slot 2 record 10 %IW0\"";
+const EXAMPLE: &str = "write the slot and the address in its module, such as \"slot 2 %IW0\", in one of its records, \
+                       such as \"slot 2 record 10 %IW0\", or a drive's parameter, such as \"parameter 1121\"";
 
-/// A position in a module or a record, as in `[fieldbus.at]`: `slot 2 %IW0`, `slot 2 record 10 %IW0`.
+/// A position, as in `[fieldbus.at]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Place {
-    pub(crate) slot: usize,
-    /// The index of the record.
-    pub(crate) record: Option<u8>,
-    pub(crate) address: Address,
+pub(crate) enum Place {
+    /// In a module: `slot 2 %IW0`.
+    Module { slot: usize, address: Address },
+    /// In a record: `slot 2 record 10 %IW0`.
+    Record {
+        slot: usize,
+        index: u8,
+        address: Address,
+    },
+    /// A parameter of a drive, or an element of one: `parameter 1121`, `parameter 945[0]`.
+    Parameter { number: u16, element: Option<usize> },
 }
 
 impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "slot {} ", self.slot)?;
-        if let Some(record) = self.record {
-            write!(f, "record {record} ")?;
+        match self {
+            Self::Module { slot, address } => write!(f, "slot {slot} {address}"),
+            Self::Record {
+                slot,
+                index,
+                address,
+            } => write!(f, "slot {slot} record {index} {address}"),
+            Self::Parameter {
+                number,
+                element: None,
+            } => write!(f, "parameter {number}"),
+            Self::Parameter {
+                number,
+                element: Some(element),
+            } => write!(f, "parameter {number}[{element}]"),
         }
-        self.address.fmt(f)
     }
 }
 
@@ -37,82 +55,125 @@ impl FromStr for Place {
     type Err = Mistake;
 
     fn from_str(text: &str) -> Result<Self, Mistake> {
+        let wrong = || {
+            Mistake::new(
+                format!("\"{}\" is no place in a module", shown(text)),
+                EXAMPLE,
+            )
+        };
         let words: Vec<&str> = text.split_ascii_whitespace().collect();
-        let parts = match words[..] {
-            ["slot", slot, address] => slot.parse().ok().map(|slot| (slot, None, address)),
-            ["slot", slot, "record", record, address] => {
-                let numbers = slot.parse().ok().zip(record.parse().ok());
-                numbers.map(|(slot, record)| (slot, Some(record), address))
-            }
-            _ => None,
+        let (slot, index, address) = match words[..] {
+            ["slot", slot, address] => (slot, None, address),
+            ["slot", slot, "record", index, address] => (slot, Some(index), address),
+            ["parameter", number] => return parameter(number).ok_or_else(wrong),
+            _ => return Err(wrong()),
         };
-        let Some((slot, record, address)) = parts else {
-            let what = format!("\"{}\" is no place in a module", shown(text));
-            return Err(Mistake::new(what, EXAMPLE));
-        };
-        Ok(Self {
-            slot,
-            record,
-            address: Address::parse(address, Addressing::Bytes)?,
+        let slot = slot.parse().map_err(|_| wrong())?;
+        let index = index.map(str::parse).transpose().map_err(|_| wrong())?;
+        let address = Address::parse(address, Addressing::Bytes)?;
+        Ok(match index {
+            None => Self::Module { slot, address },
+            Some(index) => Self::Record {
+                slot,
+                index,
+                address,
+            },
         })
     }
 }
 
+/// A parameter's number, and its element in brackets.
+fn parameter(text: &str) -> Option<Place> {
+    let (number, element) = match text.strip_suffix(']') {
+        Some(text) => {
+            let (number, element) = text.split_once('[')?;
+            let element = element.parse().ok().filter(|own| *own < ELEMENT_LIMIT)?;
+            (number, Some(element))
+        }
+        None => (text, None),
+    };
+    let number = number.parse().ok().filter(|number| *number > 0)?;
+    Some(Place::Parameter { number, element })
+}
+
 impl Place {
-    /// Checks that the position suits the signal; the module is checked elsewhere.
+    /// True for a position in a module, which the exchange of data carries.
+    pub(crate) fn is_exchanged(self) -> bool {
+        matches!(self, Self::Module { .. })
+    }
+
+    /// Checks that the position suits the signal; the device is checked elsewhere.
     pub(crate) fn suits(self, signal: &Signal) -> Result<(), Mistake> {
         let own = signal.address();
-        if (self.address.area, self.address.width) == (own.area, own.width) {
+        let (address, what) = match self {
+            Self::Module { address, .. } => (address, "module"),
+            Self::Record { address, .. } => (address, "record"),
+            Self::Parameter { .. } if format_of(signal.data_type).is_some() => return Ok(()),
+            Self::Parameter { .. } => {
+                let what = format!(
+                    "\"{}\" has a type of 8 bytes, which no parameter has",
+                    shown(&signal.name)
+                );
+                return Err(Mistake::new(what, "give it a type of at most 4"));
+            }
+        };
+        if (address.area, address.width) == (own.area, own.width) {
             return Ok(());
         }
         Err(Mistake::new(
             format!(
-                "\"{}\" is at {own}, and its place in the module is {}",
+                "\"{}\" is at {own}, and its place in the {what} is {address}",
                 shown(&signal.name),
-                self.address
             ),
             "give both the same letters",
         ))
     }
+}
 
-    /// The position's bits among all those of the station.
-    fn bits(self, modules: &Configuration) -> Result<Range<usize>, Mistake> {
-        let count = modules.modules().len();
-        let module = self
-            .slot
-            .checked_sub(1)
-            .and_then(|slot| modules.modules().get(slot));
-        let Some(module) = module.filter(|_| !modules.has_sizes_only()) else {
-            let what = format!("the station has no slot {}", self.slot);
-            return Err(Mistake::new(
-                what,
-                if modules.has_sizes_only() {
-                    "write \"config\", which says what its modules are".to_owned()
-                } else {
-                    format!("its slots are 1 to {count}")
-                },
-            ));
-        };
-        let bytes = match self.address.area {
-            Area::Input => &module.inputs,
-            Area::Output => &module.outputs,
-        };
-        let own = self.address.bits();
-        if own.end > 8 * bytes.len() {
-            return Err(Mistake::new(
-                format!(
-                    "{} lies beyond the module in slot {}",
-                    self.address, self.slot
-                ),
-                format!(
-                    "the module has {} bytes of {}",
-                    bytes.len(),
-                    self.address.area
-                ),
-            ));
-        }
-        Ok(8 * bytes.start + own.start..8 * bytes.start + own.end)
+/// The format of a parameter that a signal of this type can be.
+pub(crate) fn format_of(data_type: DataType) -> Option<Format> {
+    match data_type {
+        DataType::Bool => Some(Format::Boolean),
+        DataType::Sint => Some(Format::Integer8),
+        DataType::Int => Some(Format::Integer16),
+        DataType::Dint => Some(Format::Integer32),
+        DataType::Byte | DataType::Usint => Some(Format::Unsigned8),
+        DataType::Word | DataType::Uint => Some(Format::Unsigned16),
+        DataType::Dword | DataType::Udint => Some(Format::Unsigned32),
+        DataType::Real => Some(Format::FloatingPoint),
+        DataType::Lword | DataType::Lint | DataType::Ulint | DataType::Lreal => None,
     }
+}
+
+/// The bits of a position in a module among all those of the station.
+fn bits(slot: usize, address: Address, modules: &Configuration) -> Result<Range<usize>, Mistake> {
+    let count = modules.modules().len();
+    let module = slot
+        .checked_sub(1)
+        .and_then(|slot| modules.modules().get(slot));
+    let Some(module) = module.filter(|_| !modules.has_sizes_only()) else {
+        let what = format!("the station has no slot {slot}");
+        return Err(Mistake::new(
+            what,
+            if modules.has_sizes_only() {
+                "write \"config\", which says what its modules are".to_owned()
+            } else {
+                format!("its slots are 1 to {count}")
+            },
+        ));
+    };
+    let bytes = match address.area {
+        Area::Input => &module.inputs,
+        Area::Output => &module.outputs,
+    };
+    let own = address.bits();
+    if own.end > 8 * bytes.len() {
+        return Err(Mistake::new(
+            format!("{address} lies beyond the module in slot {slot}"),
+            format!("the module has {} bytes of {}", bytes.len(), address.area),
+        ));
+    }
+    Ok(8 * bytes.start + own.start..8 * bytes.start + own.end)
 }
 
 /// A signal's bits in the image, and in the telegram or record.
@@ -148,12 +209,12 @@ impl Layout {
             let image = signal.address().bits();
             let place = places.get(&signal.name);
             first = first.or(place.map(|(_, at)| *at));
-            // A signal in a record is in no telegram of the exchange.
-            if place.is_some_and(|(place, _)| place.record.is_some()) {
-                continue;
-            }
             let wire = match place {
-                Some((place, at)) => place.bits(modules).map_err(|mistake| (*at, mistake))?,
+                Some((Place::Module { slot, address }, at)) => {
+                    bits(*slot, *address, modules).map_err(|mistake| (*at, mistake))?
+                }
+                // No telegram of the exchange has it.
+                Some(_) => continue,
                 None => image.clone(),
             };
             let moved = Move {
@@ -238,7 +299,6 @@ pub(crate) fn copy(from: &[u8], source: usize, to: &mut [u8], target: usize, bit
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tickbus_image::signal::DataType;
 
     fn signal(name: &str, address: &str, data_type: DataType) -> Signal {
         let address: Address = address.parse().expect("right");
@@ -340,8 +400,9 @@ mod tests {
             assert_eq!((at, mistake.to_string().as_str()), (line, words));
         }
         let sizes = Configuration::of_sizes(4, 4);
-        let place: Place = "slot 1 %IW0".parse().expect("a place");
-        let why = place.bits(&sizes).expect_err("any modules").to_string();
+        let address = "%IW0".parse().expect("an address");
+        let why = bits(1, address, &sizes).expect_err("any modules");
+        let why = why.to_string();
         assert!(why.contains("write \"config\""), "{why}");
     }
 
@@ -362,14 +423,34 @@ mod tests {
 
     #[test]
     fn other_text_and_another_width_are_no_place() {
-        for text in ["2.IW0", "slot two %IW0", "slot 2", "slot 2 IW0", "%IW0"] {
+        for text in [
+            "2.IW0",
+            "slot two %IW0",
+            "slot 2",
+            "slot 2 IW0",
+            "%IW0",
+            "slot 2 record 256 %IW0",
+            "slot 2 record %IW0",
+            "parameter 0",
+            "parameter 65536",
+            "parameter 945[117]",
+            "parameter 945[0",
+            "parameter 945 %IW0",
+        ] {
             assert!(text.parse::<Place>().is_err(), "{text}");
         }
         let place: Place = " slot 12  %QX3.5".parse().expect("a place");
-        assert_eq!(
-            (place.slot, place.address.to_string().as_str()),
-            (12, "%QX3.5")
-        );
+        assert_eq!(place.to_string(), "slot 12 %QX3.5");
+        for text in [
+            "slot 0 record 254 %IW0",
+            "parameter 1121",
+            "parameter 945[116]",
+        ] {
+            let place: Place = text.parse().expect("a place");
+            assert_eq!(place.to_string(), text);
+            let of_8_bytes = place.suits(&signal("a", "%IL0", DataType::Lreal));
+            assert!(of_8_bytes.is_err());
+        }
         assert!(place.suits(&signal("a", "%QX0.0", DataType::Bool)).is_ok());
         let why = place
             .suits(&signal("a", "%QW0", DataType::Int))

@@ -9,6 +9,7 @@ mod acyclic;
 pub mod advice;
 mod configuration;
 mod device;
+mod drive;
 mod event;
 mod finder;
 mod gsd;
@@ -24,7 +25,7 @@ mod station;
 pub mod telegram;
 mod user_parameters;
 
-pub use acyclic::{Acyclic, Nameplate, Record, Refusal};
+pub use acyclic::{Acyclic, Format, Nameplate, Parameter as DriveParameter, Record, Refusal};
 pub use configuration::{Configuration, SlotModule};
 pub use device::{LineOptions, ProfibusDevice};
 pub use event::{Event, Leaving};

@@ -14,10 +14,11 @@ use tickbus_base::toml_text::{Collector, Key, Shape, Table, Value};
 use tickbus_fieldbus::{
     At, Bus, BusKind, BusOptions, BusSetup, NamedFile, OBSERVES, OpenError, Role,
 };
-use tickbus_image::signal::{Area, Signal, SignalTable};
+use tickbus_image::signal::{self, Area, Signal, SignalTable};
 use tickbus_net::serial;
 
 use crate::device::{LineOptions, ProfibusDevice, StationSetup};
+use crate::drive::parameters;
 use crate::layout::{Layout, Place};
 use crate::observer::ProfibusObserver;
 use crate::rates::{RATES, Rate, SLOT_TIME_LIMIT};
@@ -292,7 +293,8 @@ impl Options {
         let stations = self.stations().enumerate().take(table.stations.len());
         stations.map(move |(index, station)| {
             let signals = &table.stations[index];
-            let mut identity = station.identity(folder, signals)?;
+            let exchanged = self.exchanged(&table, index);
+            let mut identity = station.identity(folder, &exchanged)?;
             let layout = |area| {
                 let own = table.signals.iter();
                 let own = own.filter(|signal| (signal.station, signal.area) == (index, area));
@@ -320,9 +322,31 @@ impl Options {
         table: &SignalTable,
         index: usize,
     ) -> Result<Identity, (usize, Mistake)> {
-        let mut identity = station.identity(folder, &table.stations[index])?;
+        let mut identity = station.identity(folder, &self.exchanged(table, index))?;
         self.add_records(station, table, index, &mut identity)?;
         Ok(identity)
+    }
+
+    /// The station with the sizes of the signals that the exchange of data carries.
+    fn exchanged(&self, table: &SignalTable, index: usize) -> signal::Station {
+        let mut own = table.stations[index].clone();
+        for (area, bytes) in [
+            (Area::Input, &mut own.input_bytes),
+            (Area::Output, &mut own.output_bytes),
+        ] {
+            let signals = table.signals.iter();
+            let signals = signals.filter(|signal| (signal.station, signal.area) == (index, area));
+            let is_exchanged = |signal: &&Signal| {
+                let place = self.places.get(&signal.name);
+                place.is_none_or(|(place, _)| place.is_exchanged())
+            };
+            let (exchanged, others): (Vec<_>, Vec<_>) = signals.partition(is_exchanged);
+            if !others.is_empty() {
+                let ends = exchanged.iter().map(|signal| signal.address().bits().end);
+                *bytes = ends.max().unwrap_or(0).div_ceil(8);
+            }
+        }
+        own
     }
 
     /// Adds the records of a station, and with them the services of a device without a GSD file; returns the positions
@@ -358,8 +382,15 @@ impl Options {
             slots,
             room,
         )?;
-        let (records, layouts) = all.into_iter().unzip();
+        let (records, mut layouts): (Vec<_>, Vec<_>) = all.into_iter().unzip();
         own.records = records;
+        let signals = table.signals.iter();
+        let signals = signals.filter(|signal| signal.station == index);
+        let all = parameters(&station.parameters, signals, &self.places)?;
+        let (parameters, more): (Vec<_>, Vec<_>) = all.into_iter().unzip();
+        own.parameters = parameters;
+        layouts.extend(more);
+        station.check_indices(identity)?;
         Ok(layouts)
     }
 
@@ -370,10 +401,12 @@ impl Options {
         table: &SignalTable,
         index: usize,
     ) -> Option<usize> {
-        let fixed = station.records.iter().map(|(_, at)| *at);
+        let records = station.records.iter().map(|(_, at)| *at);
+        let parameters = station.parameters.iter().map(|(_, at)| *at);
+        let fixed = records.chain(parameters);
         let signals = table.signals.iter().filter(|own| own.station == index);
         let places = signals.filter_map(|signal| self.places.get(&signal.name));
-        let places = places.filter(|(place, _)| place.record.is_some());
+        let places = places.filter(|(place, _)| !place.is_exchanged());
         fixed.chain(places.map(|(_, at)| *at)).next()
     }
 

@@ -61,6 +61,14 @@ pub(crate) struct RecordLayout {
 }
 
 impl RecordLayout {
+    /// Adds a signal of this area.
+    pub(crate) fn push(&mut self, area: Area, own: Move) {
+        match area {
+            Area::Input => self.inputs.push(own),
+            Area::Output => self.outputs.push(own),
+        }
+    }
+
     /// Copies the inputs from the frame of the image into the record.
     pub(crate) fn fill(&self, frame: &[u8], octets: &mut [u8]) {
         for own in &self.inputs {
@@ -127,16 +135,22 @@ pub(crate) fn records<'s>(
     // The name of each signal so far, with its record and its bits.
     let mut taken: Vec<(&str, usize, Move)> = Vec::new();
     for signal in signals {
-        let Some((place, index, at)) = places.get(&signal.name).and_then(|(place, at)| {
-            let index = place.record?;
-            Some((place, index, *at))
-        }) else {
+        let Some((
+            Place::Record {
+                slot,
+                index,
+                address,
+            },
+            at,
+        )) = places.get(&signal.name)
+        else {
             continue;
         };
-        let wire = place.address.bits();
+        let (slot, index, at) = (*slot, *index, *at);
+        let wire = address.bits();
         let length = wire.end.div_ceil(8);
-        check(place.slot, index, length).map_err(|mistake| (at, mistake))?;
-        let slot = u8::try_from(place.slot).expect("checked");
+        check(slot, index, length).map_err(|mistake| (at, mistake))?;
+        let slot = u8::try_from(slot).expect("checked");
         let same = |(own, _): &(Record, RecordLayout)| (own.slot, own.index) == (slot, index);
         let number = all.iter().position(same).unwrap_or_else(|| {
             let record = Record {
@@ -161,12 +175,8 @@ pub(crate) fn records<'s>(
         taken.push((&signal.name, number, own.clone()));
         let (record, layout) = &mut all[number];
         record.octets.resize(record.octets.len().max(length), 0);
-        if signal.area == Area::Input {
-            layout.inputs.push(own);
-        } else {
-            record.is_writable = true;
-            layout.outputs.push(own);
-        }
+        record.is_writable |= signal.area == Area::Output;
+        layout.push(signal.area, own);
     }
     Ok(all)
 }

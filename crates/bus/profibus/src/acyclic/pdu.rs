@@ -36,6 +36,8 @@ pub enum Refusal {
     State = 0xB5,
     /// The record can only be read.
     Access = 0xB6,
+    /// The request for parameters in record 47 is not well formed.
+    Range = 0xB7,
 }
 
 impl fmt::Display for Refusal {
@@ -46,8 +48,9 @@ impl fmt::Display for Refusal {
             Self::Length => "the record has another length",
             Self::Slot => "the device has no such slot",
             Self::Form => "the request is not well formed",
-            Self::State => "record 255 is read after a request that says what",
+            Self::State => "the record is read after a request that says what",
             Self::Access => "the record can only be read",
+            Self::Range => "the request for parameters is not well formed",
         };
         write!(f, "{text} (error code {:02X})", *self as u8)
     }

@@ -1,6 +1,9 @@
 //! The records of a station, and the requests to read and write them.
 
-use super::identification::{INDEX, Identification, Nameplate};
+use super::Acyclic;
+use super::drive::{self, Parameter};
+use super::identification::{INDEX, Identification};
+use super::machine::Machine;
 use super::pdu::{Refusal, function, refuse};
 
 /// A block of octets that masters read, and may write.
@@ -16,36 +19,31 @@ pub struct Record {
     pub is_writable: bool,
 }
 
-/// The machine behind the records.
-pub(crate) trait Machine {
-    /// Fills in the octets of the record that the machine provides; the others stay.
-    fn read(&mut self, record: usize, octets: &mut [u8]);
-
-    /// A master has written these octets into the record.
-    fn written(&mut self, record: usize, octets: &[u8]);
-
-    /// A master's request for a record was refused.
-    fn refused(&mut self, writes: bool, slot: u8, index: u8, why: Refusal);
+/// What a master has written into a record before it reads the record.
+#[derive(Debug, Default)]
+pub(super) struct Called {
+    /// The part of record 255 that it has named in a slot.
+    part: Option<(u8, u16)>,
+    /// The answer to its request for parameters in record 47; empty if there is no such answer.
+    parameters: Vec<u8>,
 }
-
-/// The part of record 255 that a master has named before it reads the record.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Called(Option<(u8, u16)>);
 
 /// The records.
 #[derive(Debug)]
 pub(super) struct Records {
     all: Vec<Record>,
+    parameters: Vec<Parameter>,
     identification: Identification,
     /// The highest slot.
     slots: u8,
 }
 
 impl Records {
-    pub(super) fn new(all: Vec<Record>, nameplate: &Nameplate, slots: u8) -> Self {
+    pub(super) fn new(own: &Acyclic, slots: u8) -> Self {
         Self {
-            all,
-            identification: Identification::new(nameplate),
+            all: own.records.clone(),
+            parameters: own.parameters.clone(),
+            identification: Identification::new(&own.nameplate),
             slots,
         }
     }
@@ -61,7 +59,7 @@ impl Records {
         let service = request[0];
         let served = match *request {
             [function::READ, slot, index, length] if length > 0 => {
-                self.read(slot, index, length, *called, machine, &mut answer)
+                self.read(slot, index, length, called, machine, &mut answer)
             }
             [function::WRITE, slot, index, length, ref data @ ..] if length > 0 => {
                 if data.len() == length.into() {
@@ -88,15 +86,21 @@ impl Records {
         slot: u8,
         index: u8,
         length: u8,
-        Called(called): Called,
+        called: &mut Called,
         machine: &mut impl Machine,
         answer: &mut Vec<u8>,
     ) -> Result<(), Refusal> {
         let mut octets = if index == INDEX {
             self.check_slot(slot)?;
-            match called {
+            match called.part {
                 Some((of, part)) if of == slot => self.identification.read(part)?,
                 _ => return Err(Refusal::State),
+            }
+        } else if self.is_drive(index) {
+            self.check_slot(slot)?;
+            match std::mem::take(&mut called.parameters) {
+                answer if answer.is_empty() => return Err(Refusal::State),
+                answer => answer,
             }
         } else {
             let own = self.position(slot, index)?;
@@ -116,13 +120,19 @@ impl Records {
         slot: u8,
         index: u8,
         data: &[u8],
-        Called(called): &mut Called,
+        called: &mut Called,
         machine: &mut impl Machine,
     ) -> Result<(), Refusal> {
         if index == INDEX {
             self.check_slot(slot)?;
-            *called = None;
-            *called = Some((slot, self.identification.call(data)?));
+            called.part = None;
+            called.part = Some((slot, self.identification.call(data)?));
+            return Ok(());
+        }
+        if self.is_drive(index) {
+            self.check_slot(slot)?;
+            called.parameters.clear();
+            called.parameters = drive::serve(data, &mut self.parameters, self.all.len(), machine)?;
             return Ok(());
         }
         let own = self.position(slot, index)?;
@@ -136,6 +146,11 @@ impl Records {
         record.octets.copy_from_slice(data);
         machine.written(own, data);
         Ok(())
+    }
+
+    /// True for the record with the parameters of a drive.
+    fn is_drive(&self, index: u8) -> bool {
+        index == drive::INDEX && !self.parameters.is_empty()
     }
 
     fn check_slot(&self, slot: u8) -> Result<(), Refusal> {

@@ -122,6 +122,38 @@ fn wrong_requests_are_refused_with_the_codes_of_the_standard() {
     assert_eq!(machine.refused[0], (false, 2, 11, Refusal::Index));
 }
 
+/// Record 47 holds an answer after a request, once, for the master that sent it.
+#[test]
+fn the_parameters_of_a_drive_are_read_by_two_requests() {
+    let own = Acyclic {
+        class_1: true,
+        parameters: vec![Parameter {
+            number: 1121,
+            format: Format::Unsigned16,
+            is_array: false,
+            octets: vec![0, 5],
+            is_writable: false,
+        }],
+        ..Acyclic::default()
+    };
+    let mut server = Server::new(&own, 2);
+    server.reset(true);
+    let mut machine = Kept::default();
+    let request = [0x5F, 1, 47, 10, 9, 1, 0, 1, 0x10, 1, 0x04, 0x61, 0, 0];
+    let answer = [0x5E, 1, 47, 8, 9, 1, 0, 1, 6, 1, 0, 5];
+    let none = [0xDE, 128, 0xB5, 0];
+    let fetch = [0x5E, 1, 47, 240];
+    assert_eq!(ask(&mut server, &mut machine, &fetch), none);
+    assert_eq!(ask(&mut server, &mut machine, &request), request[..4]);
+    assert_eq!(ask(&mut server, &mut machine, &fetch), answer);
+    assert_eq!(ask(&mut server, &mut machine, &fetch), none);
+    let wrong = [0x5F, 1, 47, 4, 9, 1, 0, 0];
+    let refused = ask(&mut server, &mut machine, &wrong);
+    assert_eq!(refused, [0xDF, 128, 0xB7, 0]);
+    let slot = ask(&mut server, &mut machine, &[0x5E, 3, 47, 240]);
+    assert_eq!(slot, [0xDE, 128, 0xB2, 0]);
+}
+
 #[test]
 fn the_connection_of_the_owner_is_open_while_its_parameters_say_so() {
     let (mut server, mut machine) = (server(), Kept::default());

@@ -74,6 +74,28 @@ impl StationOptions {
                 ),
             );
         }
+        for parameter in &identity.acyclic.parameters {
+            let count = parameter.octets.len() / parameter.format.octets();
+            let (elements, access) = (
+                if parameter.is_array {
+                    format!("[{count}]")
+                } else {
+                    String::new()
+                },
+                if parameter.is_writable {
+                    "read and written"
+                } else {
+                    "read"
+                },
+            );
+            put(
+                "parameter",
+                format!(
+                    "{}{elements}, {:?}, {access}",
+                    parameter.number, parameter.format
+                ),
+            );
+        }
         let defaults = identity.user.defaults();
         if !defaults.is_empty() {
             put("Set_Prm", format!("{} by default", hex(defaults)));

@@ -32,7 +32,11 @@ impl Options {
                 idents.push(*own);
             }
             if ident.is_none_or(|asked| asked == *own) {
-                let mut identity = super::station::plain(*own, configuration.as_ref(), signals);
+                let mut identity = super::station::plain(
+                    *own,
+                    configuration.as_ref(),
+                    &self.exchanged(table, index),
+                );
                 let records = self.add_records(station, table, index, &mut identity);
                 records.map_err(|(_, mistake)| mistake)?;
                 stations.push((station.address, signals.name.as_str(), identity));

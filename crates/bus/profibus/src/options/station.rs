@@ -2,14 +2,16 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Key, Shape, Table, Value};
 use tickbus_image::signal;
 
 use super::Keys;
-use crate::acyclic::{Acyclic, Nameplate};
+use crate::acyclic::{Acyclic, Nameplate, PARAMETERS};
 use crate::configuration::Configuration;
+use crate::drive::FixedParameter;
 use crate::gsd::Gsd;
 use crate::records::Fixed;
 use crate::station::Identity;
@@ -62,6 +64,11 @@ pub(crate) const KEYS: &[Key] = &[
         "Records with octets, such as \"slot 2 record 10 = 00 64\"",
     ),
     Key::new(
+        "parameters",
+        Shape::List(&Shape::Label(RECORD_TEXT_LIMIT), 1, RECORDS_LIMIT),
+        "Parameters of a drive with values, such as \"945 Unsigned16 = 1355 0 0\"",
+    ),
+    Key::new(
         "config",
         Shape::List(&Shape::Whole(0, 255), 1, DATA_LIMIT),
         "Beside \"ident\": the identifiers of the modules",
@@ -79,6 +86,7 @@ pub(crate) const OWN_KEYS: &[Key] = &[
     KEYS[3],
     KEYS[4],
     KEYS[5],
+    KEYS[6],
 ];
 
 /// The keys of one station.
@@ -90,6 +98,8 @@ pub struct StationOptions {
     pub device: Device,
     /// The records with their octets, each with its offset.
     pub(super) records: Vec<(Fixed, usize)>,
+    /// The parameters of a drive with their values, each with its offset.
+    pub(super) parameters: Vec<(FixedParameter, usize)>,
     /// The offset of the address, and the line.
     pub(super) at: usize,
     pub(super) line: usize,
@@ -176,6 +186,22 @@ impl StationOptions {
         );
         let right = "remove the record, or take the GSD file of a device with DP-V1";
         Err((at, Mistake::new(what, right)))
+    }
+}
+
+impl StationOptions {
+    /// Checks that no record has the index of the parameters.
+    pub(super) fn check_indices(&self, identity: &Identity) -> Result<(), (usize, Mistake)> {
+        let own = &identity.acyclic;
+        let mut records = own.records.iter();
+        if own.parameters.is_empty() || records.all(|record| record.index != PARAMETERS) {
+            return Ok(());
+        }
+        let what = format!(
+            "station {}: record {PARAMETERS} has the parameters of the drive",
+            self.address
+        );
+        Err((self.at, Mistake::new(what, "give the record another index")))
     }
 }
 
@@ -270,7 +296,8 @@ pub(super) fn read_station(table: &mut Table<'_>, is_required: bool) -> Keys {
     let ident = table.take("ident");
     let config = table.take("config");
     let records = table.take("records");
-    let others = [&gsd, &modules, &ident, &config, &records];
+    let parameters = table.take("parameters");
+    let others = [&gsd, &modules, &ident, &config, &records, &parameters];
     if !is_required && address.is_none() {
         let Some(stray) = others.into_iter().flatten().next() else {
             return Keys::Absent;
@@ -336,17 +363,25 @@ pub(super) fn read_station(table: &mut Table<'_>, is_required: bool) -> Keys {
             None
         }
     };
-    let records = records.map_or(Some(Vec::new()), |value| read_records(&value));
-    match (address, device, records) {
-        (Some(address), Some(device), Some(records)) => Keys::Right(StationOptions {
-            address,
-            device,
-            records,
-            at,
-            line,
-            gsd_at,
-            modules_at,
-        }),
+    let records = records.map_or(Some(Vec::new()), |value| {
+        read_texts(&value, "records", "slot 2 record 10 = 00 64")
+    });
+    let parameters = parameters.map_or(Some(Vec::new()), |value| {
+        read_texts(&value, "parameters", "945 Unsigned16 = 1355 0 0")
+    });
+    match (address, device, records, parameters) {
+        (Some(address), Some(device), Some(records), Some(parameters)) => {
+            Keys::Right(StationOptions {
+                address,
+                device,
+                records,
+                parameters,
+                at,
+                line,
+                gsd_at,
+                modules_at,
+            })
+        }
         _ => Keys::Wrong,
     }
 }
@@ -367,26 +402,31 @@ fn read_modules(value: &Value<'_>) -> Option<Vec<String>> {
     names.collect()
 }
 
-fn read_records(value: &Value<'_>) -> Option<Vec<(Fixed, usize)>> {
-    let right = "write the records, such as [\"slot 2 record 10 = 00 64\"]";
-    let texts = value.list(right)?;
+/// Reads records or parameters, each with its offset.
+fn read_texts<T: FromStr<Err = Mistake>>(
+    value: &Value<'_>,
+    what: &str,
+    example: &str,
+) -> Option<Vec<(T, usize)>> {
+    let right = format!("write the {what}, such as [\"{example}\"]");
+    let texts = value.list(&right)?;
     if texts.len() > RECORDS_LIMIT {
         value.wrong(
-            format!("there are {} records", texts.len()),
+            format!("there are {} {what}", texts.len()),
             format!("a station has at most {RECORDS_LIMIT}"),
         );
         return None;
     }
-    let read = |text: &Value<'_>| match text.label(RECORD_TEXT_LIMIT, right)?.parse() {
-        Ok(record) => Some((record, text.at())),
+    let read = |text: &Value<'_>| match text.label(RECORD_TEXT_LIMIT, &right)?.parse() {
+        Ok(own) => Some((own, text.at())),
         Err(mistake) => {
             text.refuse(mistake);
             None
         }
     };
     // All mistakes are reported, not only the first.
-    let records: Vec<_> = texts.iter().map(read).collect();
-    records.into_iter().collect()
+    let all: Vec<_> = texts.iter().map(read).collect();
+    all.into_iter().collect()
 }
 
 fn read_config(value: &Value<'_>) -> Option<Configuration> {

@@ -19,6 +19,8 @@ const UNSAFE_HOMES: &[&str] = &[
     "crates/bus/plugin/src/library.rs",
     "crates/core/conformance/src/resources.rs",
     "crates/sync/federation/src/helics/library.rs",
+    "crates/sync/federation/src/silkit/library.rs",
+    "crates/sync/federation/src/text.rs",
     "crates/tools/fmi/src/foreign/library",
     "crates/core/image/src/triple.rs",
     "crates/tools/launcher/src/main.rs",

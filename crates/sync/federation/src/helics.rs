@@ -5,7 +5,10 @@
 
 mod find;
 mod library;
+mod settings;
 mod sources;
+
+pub use settings::{HelicsMapping, HelicsSettings};
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -13,11 +16,9 @@ use std::sync::Arc;
 use tickbus_base::Mistake;
 use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_bus_sdsp::connect;
-use tickbus_image::signal::DataType;
-use tickbus_virtual_time::client::{Asked, Connection};
-use tickbus_virtual_time::{Cause, Ended, Meeting, Outcome, Step};
+use tickbus_virtual_time::{Ended, Meeting, Outcome, Step};
 
-use crate::mapping::Mapping;
+use crate::member::{Federation, ended, run};
 use crate::value::{Kind, Value};
 use crate::watch::Watch;
 use library::{Federate, Library, Publication, Subscription};
@@ -38,7 +39,7 @@ pub struct HelicsOptions {
 /// A federation of HELICS as a client of a run.
 #[derive(Debug)]
 pub struct Helics {
-    mapping: Mapping,
+    mapping: HelicsMapping,
     options: HelicsOptions,
     library: Library,
     clock: Arc<dyn Clock>,
@@ -63,7 +64,7 @@ impl Helics {
     ///
     /// The library is missing, or is not one of HELICS 3.
     pub fn open(
-        mapping: Mapping,
+        mapping: HelicsMapping,
         options: HelicsOptions,
         clock: Arc<dyn Clock>,
         stop: &Stop,
@@ -97,7 +98,7 @@ impl Helics {
         let mut joined = self.join().map_err(|reason| self.ended(reason))?;
         news(&format!(
             "the federate \"{}\" has joined; the federation is not complete yet",
-            mapping.federate
+            mapping.name
         ));
         let complete = joined.complete();
         let outcome = complete
@@ -107,7 +108,7 @@ impl Helics {
                 let at = (meeting, &self.clock);
                 let timeout = self.options.timeout;
                 let connection = connect(at, timeout, &mapping.declaration(), &self.stop)?;
-                joined.run(connection)
+                run(connection, mapping, timeout, &mut joined)
             });
         let Joined { mut federate, .. } = joined;
         if let Err(ended) = &outcome {
@@ -120,17 +121,7 @@ impl Helics {
     }
 
     fn ended(&self, reason: String) -> Ended {
-        let cause = if self.stop.is_stopped() {
-            Cause::Stopped
-        } else {
-            Cause::Failed
-        };
-        Ended {
-            cause,
-            client: Some(self.mapping.client.clone()),
-            reason,
-            steps: 0,
-        }
+        ended(&self.stop, &self.mapping.client, reason)
     }
 
     /// Connects with the broker, and registers everything that the mapping names.
@@ -142,7 +133,7 @@ impl Helics {
         })?;
         let timeout = self.options.timeout;
         let init = "--federates=1 --loglevel=none";
-        let (init, broker) = match &mapping.broker {
+        let (init, broker) = match &mapping.engine.broker {
             Some(address) => {
                 let (host, port) = (&address.host, address.port);
                 let init = format!("{init} --broker_address={host} --brokerport={port}");
@@ -152,7 +143,7 @@ impl Helics {
         };
         let what = format!("been joined through a broker {broker}");
         let federate = watch.call(Some(timeout), &what, || {
-            library.federate(&mapping.federate, &mapping.core, &init)
+            library.federate(&mapping.name, &mapping.engine.core, &init)
         });
         let mut federate = federate.map_err(|why| {
             if self.stop.is_stopped() {
@@ -161,7 +152,7 @@ impl Helics {
             format!(
                 "the federate \"{}\" cannot join a federation through a broker {broker}: {why}; start helics_broker \
                  first with the core type \"{}\", and give each federate another name",
-                mapping.federate, mapping.core
+                mapping.name, mapping.engine.core
             )
         })?;
         let cannot =
@@ -178,7 +169,7 @@ impl Helics {
         let subscriptions = subscriptions.collect::<Result<_, _>>()?;
         Ok(Joined {
             helics: self,
-            sources: Sources::new(&mapping.federate, self.clock.now()),
+            sources: Sources::new(&mapping.name, self.clock.now()),
             watch,
             federate,
             publications,
@@ -220,38 +211,9 @@ impl Joined<'_> {
         }
         Ok(())
     }
+}
 
-    /// Runs until the end.
-    fn run(&mut self, mut connection: Connection) -> Result<Outcome, Ended> {
-        let subscribe = &self.helics.mapping.subscribe;
-        let mut writes: Vec<u64> = subscribe.iter().map(|one| one.initial).collect();
-        loop {
-            let asked = connection.wait(self.helics.options.timeout);
-            let ran = match asked? {
-                Asked::Initial => self.check_types(connection.client().read_types()),
-                Asked::Step(step) => self.step(step, connection.client().reads(), &mut writes),
-                Asked::End(outcome) => return outcome,
-            };
-            match ran {
-                Ok(()) => connection.answer(&writes),
-                // The server answers with the end.
-                Err(reason) => connection.give_up(&reason),
-            }
-        }
-    }
-
-    /// The types of the run's variables are those of the mapping.
-    fn check_types(&self, found: &[DataType]) -> Result<(), String> {
-        let mut all = self.helics.mapping.publish.iter().zip(found);
-        match all.find(|(own, found)| own.data_type != **found) {
-            Some((own, found)) => Err(format!(
-                "publishes \"{}\" as {}, but that is {found}; write type = \"{found}\"",
-                own.variable, own.data_type
-            )),
-            None => Ok(()),
-        }
-    }
-
+impl Federation for Joined<'_> {
     /// One step: publishes, requests the time of the step, and takes the values of the federation.
     fn step(&mut self, step: Step, reads: &[u64], writes: &mut [u64]) -> Result<(), String> {
         let mapping = &self.helics.mapping;

@@ -1,11 +1,16 @@
-//! A federation of another engine as one client of a run on virtual time: each step of the client is a time request there.
+//! A federation of another engine as one client of a run on virtual time: each step of the client is one step there.
 //!
 //! The engine's library is loaded at run time; a file maps variables of the run to publications of the federation.
 
+mod find;
 mod helics;
 mod mapping;
+mod member;
+mod silkit;
+mod text;
 mod value;
 mod watch;
 
-pub use helics::{Helics, HelicsOptions};
-pub use mapping::{Mapping, Publish, Subscribe};
+pub use helics::{Helics, HelicsMapping, HelicsOptions, HelicsSettings};
+pub use mapping::{Engine, Mapping, Publish, Subscribe};
+pub use silkit::{Label, SilKit, SilKitMapping, SilKitOptions, SilKitSettings, Topic};

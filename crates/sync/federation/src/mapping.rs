@@ -2,64 +2,84 @@
 
 use std::path::Path;
 
+use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Mistakes, Table, load_text, read_text};
 use tickbus_image::signal::DataType;
-use tickbus_net::Address;
 use tickbus_virtual_time::{Declaration, Variable};
 
 use crate::value::{Kind, Value};
 
 /// The longest name in a federation, in characters.
-const LONGEST: usize = 255;
+pub(crate) const LONGEST: usize = 255;
+
+/// The part of a mapping that differs between the engines.
+pub trait Engine: Sized {
+    /// The place of a value in the federation.
+    type Key;
+    /// The name of the file's table.
+    const TABLE: &'static str;
+    /// The key of the name in the federation.
+    const NAME: &'static str;
+    /// The engine must know the length of a step before the run does.
+    const NEEDS_STEP: bool;
+
+    /// Takes the keys that only this engine has.
+    fn read(table: &mut Table<'_>) -> Option<Self>;
+
+    /// Takes the keys that say where the value of a variable is in the federation.
+    fn key(table: &mut Table<'_>, variable: Option<&str>) -> Option<Self::Key>;
+
+    /// Checks that a variable of this type can be subscribed to.
+    ///
+    /// # Errors
+    ///
+    /// The engine has no such values.
+    fn subscribes(_variable: &str, _data_type: DataType) -> Result<(), Mistake> {
+        Ok(())
+    }
+}
 
 /// The content of the file.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Mapping {
+pub struct Mapping<E: Engine> {
     /// The name of the client in the run.
     pub client: String,
     /// The name in the federation.
-    pub federate: String,
-    /// The virtual time between two requests; `None`: the server's step.
+    pub name: String,
+    /// The virtual time between two steps of the client; `None`: the server's step.
     pub step: Option<Nanos>,
-    /// The broker; `None`: the one that the engine finds.
-    pub broker: Option<Address>,
-    /// The engine's transport, such as `zmq`.
-    pub core: String,
+    /// The engine's own keys.
+    pub engine: E,
     /// The variables that the federation gets.
-    pub publish: Vec<Publish>,
+    pub publish: Vec<Publish<E::Key>>,
     /// The variables that the federation writes.
-    pub subscribe: Vec<Subscribe>,
+    pub subscribe: Vec<Subscribe<E::Key>>,
 }
 
 /// A variable of the run that is published in the federation.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Publish {
+pub struct Publish<K> {
     /// The variable.
     pub variable: String,
-    /// The key of the publication.
-    pub key: String,
+    /// The place of the publication.
+    pub key: K,
     /// The type that the variable has.
     pub data_type: DataType,
 }
 
 /// A publication of the federation that is a variable of the run.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Subscribe {
+pub struct Subscribe<K> {
     /// The variable, and its type.
     pub variable: Variable,
-    /// The key of the publication.
-    pub key: String,
+    /// The place of the publication.
+    pub key: K,
     /// The raw value until something is published.
     pub initial: u64,
 }
 
-/// The transports of HELICS.
-const CORES: [&str; 8] = [
-    "zmq", "zmqss", "tcp", "tcpss", "udp", "ipc", "mpi", "inproc",
-];
-
-impl Mapping {
+impl<E: Engine> Mapping<E> {
     /// Reads the file at `path`.
     ///
     /// # Errors
@@ -77,10 +97,13 @@ impl Mapping {
     pub fn parse(file: &str, text: &str) -> Result<Self, Mistakes> {
         let mut collector = Collector::new(file, text);
         let read = read_text(&mut collector, text, |mut root| {
-            let right = "write a [helics] table with client, publish and subscribe";
-            let helics = root.require("helics", right);
+            let right = format!(
+                "write a [{}] table with client, publish and subscribe",
+                E::TABLE
+            );
+            let engine = root.require(E::TABLE, &*right);
             root.finish();
-            read(helics?.table("[helics]", right)?)
+            read(engine?.table(&format!("[{}]", E::TABLE), &right)?)
         });
         match collector.finish() {
             Some(mistakes) => Err(mistakes),
@@ -102,46 +125,55 @@ impl Mapping {
     }
 }
 
-fn read(mut table: Table<'_>) -> Option<Mapping> {
-    let name = "write a name, such as \"grid\"";
+fn read<E: Engine>(mut table: Table<'_>) -> Option<Mapping<E>> {
+    let right = "write a name, such as \"grid\"";
     let client = table.require(
         "client",
         "add the name of this client in the run, such as client = \"grid\"",
     );
-    let federate = table.take("federate");
-    let step = table.take("step");
-    let broker = table.take("broker");
-    let core = table.take("core");
+    let name = table.take(E::NAME);
+    let step = if E::NEEDS_STEP {
+        let right = "add the time between two steps, such as step = \"10ms\"";
+        table.require("step", right).map(Some)
+    } else {
+        Some(table.take("step"))
+    };
     let publish = table.take("publish");
     let subscribe = table.take("subscribe");
+    let engine = E::read(&mut table);
+    let (publish_tables, subscribe_tables) = (
+        format!("[[{}.publish]]", E::TABLE),
+        format!("[[{}.subscribe]]", E::TABLE),
+    );
     table.require_one_of(
         &["publish", "subscribe"],
-        "add [[helics.publish]] tables with the variables that the federation reads, or [[helics.subscribe]] tables with \
-         those that it writes",
+        format!(
+            "add {publish_tables} tables with the variables that the federation reads, or {subscribe_tables} tables with \
+             those that it writes"
+        ),
     );
     let (collector, at) = (table.collector(), table.at());
     table.finish();
-    let client = client.and_then(|value| value.label(LONGEST, name));
-    let federate = federate.map_or(Some(client.unwrap_or_default()), |value| {
-        value.label(LONGEST, name)
+    let client = client.and_then(|value| value.label(LONGEST, right));
+    let name = name.map_or(Some(client.unwrap_or_default()), |value| {
+        value.label(LONGEST, right)
     });
-    let step = step.map_or(Some(None), |value| value.duration().map(Some));
-    let broker = broker.map_or(Some(None), |value| Address::read_dialled(&value).map(Some));
-    let core = core.map_or(Some("zmq"), |value| {
-        value.choice("core types", &CORES.map(|core| (core, core)))
-    });
-    let publish = publish.map(|value| value.tables("[[helics.publish]]"));
-    let publish: Vec<Option<Publish>> = publish.into_iter().flatten().map(read_publish).collect();
-    let subscribe = subscribe.map(|value| value.tables("[[helics.subscribe]]"));
-    let subscribe: Vec<Option<Subscribe>> = (subscribe.into_iter().flatten())
-        .map(read_subscribe)
+    let step = step.and_then(|step| step.map_or(Some(None), |value| value.duration().map(Some)));
+    let publish = publish.map(|value| value.tables(&publish_tables));
+    let publish: Vec<Option<_>> = publish
+        .into_iter()
+        .flatten()
+        .map(read_publish::<E>)
+        .collect();
+    let subscribe = subscribe.map(|value| value.tables(&subscribe_tables));
+    let subscribe: Vec<Option<_>> = (subscribe.into_iter().flatten())
+        .map(read_subscribe::<E>)
         .collect();
     let mapping = Mapping {
         client: client?.to_owned(),
-        federate: federate?.to_owned(),
+        name: name?.to_owned(),
         step: step?,
-        broker: broker?,
-        core: core?.to_owned(),
+        engine: engine?,
         publish: publish.into_iter().collect::<Option<_>>()?,
         subscribe: subscribe.into_iter().collect::<Option<_>>()?,
     };
@@ -152,23 +184,17 @@ fn read(mut table: Table<'_>) -> Option<Mapping> {
     Some(mapping)
 }
 
-/// The keys of both kinds of tables: variable, key and type.
-fn read_names<'a>(table: &mut Table<'a>) -> Option<(&'a str, &'a str, DataType)> {
+/// The keys of both kinds of tables: the variable, its place in the federation, and its type.
+fn read_names<'a, E: Engine>(table: &mut Table<'a>) -> Option<(&'a str, E::Key, DataType)> {
     let right = "write the name of a variable of the run";
     let variable = table.require(
         "variable",
         "add the variable of the run, such as variable = \"level\"",
     );
-    let key = table.take("key");
+    let variable = variable.and_then(|value| value.label(LONGEST, right));
+    let key = E::key(table, variable);
     let types = DataType::ALL.map(|data_type| (data_type.name(), data_type));
     let data_type = table.require("type", "add the variable's type, such as type = \"LREAL\"");
-    let variable = variable.and_then(|value| value.label(LONGEST, right));
-    let key = key.map_or(variable, |value| {
-        value.label(
-            LONGEST,
-            "write the key of the publication, such as \"tank/level\"",
-        )
-    });
     let data_type = data_type.and_then(|value| {
         if let Some("STRING" | "WSTRING") = value.as_text() {
             value.wrong(
@@ -182,31 +208,26 @@ fn read_names<'a>(table: &mut Table<'a>) -> Option<(&'a str, &'a str, DataType)>
     Some((variable?, key?, data_type?))
 }
 
-fn read_publish(mut table: Table<'_>) -> Option<Publish> {
-    let names = read_names(&mut table);
+fn read_publish<E: Engine>(mut table: Table<'_>) -> Option<Publish<E::Key>> {
+    let names = read_names::<E>(&mut table);
     table.finish();
     let (variable, key, data_type) = names?;
     Some(Publish {
         variable: variable.to_owned(),
-        key: key.to_owned(),
+        key,
         data_type,
     })
 }
 
-fn read_subscribe(mut table: Table<'_>) -> Option<Subscribe> {
-    let names = read_names(&mut table);
+fn read_subscribe<E: Engine>(mut table: Table<'_>) -> Option<Subscribe<E::Key>> {
+    let names = read_names::<E>(&mut table);
     let initial = table.take("initial");
     let (collector, at) = (table.collector(), table.at());
     table.finish();
     let (variable, key, data_type) = names?;
-    if data_type == DataType::Real {
-        collector.report(
-            at,
-            format!("the variable \"{variable}\" is a REAL, and a publication has all 64 bits of a number"),
-            "write type = \"LREAL\": no value is rounded then",
-        );
-        return None;
-    }
+    E::subscribes(variable, data_type)
+        .map_err(|mistake| collector.collect(at, mistake))
+        .ok()?;
     let initial = initial.map_or(Some(0), |value| {
         let initial = match Kind::of(data_type) {
             Kind::Boolean => Value::Boolean(value.boolean()?),
@@ -222,27 +243,32 @@ fn read_subscribe(mut table: Table<'_>) -> Option<Subscribe> {
     });
     Some(Subscribe {
         variable: Variable::new(variable, data_type),
-        key: key.to_owned(),
+        key,
         initial: initial?,
     })
 }
 
 #[cfg(test)]
 mod tests {
+    use tickbus_net::Address;
+
     use super::*;
+    use crate::helics::{HelicsMapping, HelicsSettings};
 
     #[test]
     fn a_file_maps_variables_to_publications() {
         let text = "[helics]\nclient = \"grid\"\nstep = \"10ms\"\nbroker = \"127.0.0.1:23404\"\n\
             [[helics.publish]]\nvariable = \"valve\"\nkey = \"plc/valve\"\ntype = \"BOOL\"\n\
             [[helics.subscribe]]\nvariable = \"level\"\ntype = \"LREAL\"\ninitial = 0.5\n";
-        let mapping = Mapping::parse("grid.toml", text).expect("it is right");
+        let mapping = HelicsMapping::parse("grid.toml", text).expect("it is right");
         let expected = Mapping {
             client: "grid".to_owned(),
-            federate: "grid".to_owned(),
+            name: "grid".to_owned(),
             step: Some(Nanos::from_millis(10)),
-            broker: Some(Address::local(23_404)),
-            core: "zmq".to_owned(),
+            engine: HelicsSettings {
+                broker: Some(Address::local(23_404)),
+                core: "zmq".to_owned(),
+            },
             publish: vec![Publish {
                 variable: "valve".to_owned(),
                 key: "plc/valve".to_owned(),
@@ -263,7 +289,7 @@ mod tests {
             [[helics.publish]]\nvariable = \"a\"\ntype = \"STRING\"\n\
             [[helics.subscribe]]\nvariable = \"b\"\ntype = \"REAL\"\n\
             [[helics.subscribe]]\nvariable = \"c\"\ntype = \"USINT\"\ninitial = 256\n";
-        let told = Mapping::parse("grid.toml", text).expect_err("it is wrong");
+        let told = HelicsMapping::parse("grid.toml", text).expect_err("it is wrong");
         let told = told.to_string();
         for part in [
             "grid.toml:2:1: unknown key \"cilent\" in [helics]; did you mean \"client\"?",
@@ -277,7 +303,7 @@ mod tests {
         }
         let twice = "[helics]\nclient = \"grid\"\nsubscribe = [{ variable = \"a\", type = \"BOOL\" }, { variable = \"a\", \
             key = \"b\", type = \"BOOL\" }]\n";
-        let told = Mapping::parse("grid.toml", twice)
+        let told = HelicsMapping::parse("grid.toml", twice)
             .expect_err("twice")
             .to_string();
         assert!(told.contains("writes the variable \"a\" twice"), "{told}");

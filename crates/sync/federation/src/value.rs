@@ -65,10 +65,14 @@ impl Value {
     ///
     /// # Errors
     ///
-    /// The type does not have this number.
+    /// The type does not have this whole number. A number for a REAL is rounded to its 32 bits.
+    #[expect(clippy::cast_possible_truncation, reason = "a REAL has 32 bits")]
     pub(crate) fn raw(self, data_type: DataType) -> Result<u64, String> {
         match self {
             Self::Boolean(on) => Ok(on.into()),
+            Self::Double(number) if data_type == DataType::Real => {
+                Ok((number as f32).to_bits().into())
+            }
             Self::Double(number) => Ok(number.to_bits()),
             Self::Integer(number) => {
                 let fits = (data_type.is_signed() || number >= 0)

@@ -6,6 +6,7 @@ use std::process::Command;
 use tickbus_base::Mistake;
 
 use super::library::Library;
+use crate::find::load_named;
 
 /// The library as the system's package has it.
 const NAME: &str = if cfg!(windows) {
@@ -22,15 +23,9 @@ const SCRIPT: &str =
 
 /// Loads the library that is named, or the first one that is found.
 pub(super) fn load(named: Option<&Path>) -> Result<Library, Mistake> {
-    let environment = || std::env::var_os("HELICS_LIBRARY").filter(|path| !path.is_empty());
-    let named = named
-        .map(Path::to_owned)
-        .or_else(|| environment().map(PathBuf::from));
-    if let Some(path) = named {
-        return Library::load(&path).map_err(|mistake| {
-            let what = format!("HELICS, {}: {}", path.display(), mistake.what);
-            Mistake::new(what, mistake.right)
-        });
+    let asked = (named, "HELICS_LIBRARY");
+    if let Some(loaded) = load_named("HELICS", asked, Library::load) {
+        return loaded;
     }
     if let Some(path) = of_python() {
         return Library::load(&path);

@@ -2,17 +2,16 @@
 
 #![allow(unsafe_code, reason = "a foreign library is called")]
 
-use std::ffi::{CStr, CString, c_char, c_int, c_void};
+use std::ffi::{c_int, c_void};
 use std::path::Path;
 use std::ptr::null;
 
-use tickbus_base::os::one_line;
 use tickbus_base::{Mistake, vendor_functions};
 
+use crate::text::{Text, c_text, text_of};
 use crate::value::{Kind, Value};
 
 type Handle = *mut c_void;
-type Text = *const c_char;
 type SetText = unsafe extern "C" fn(Handle, Text, *mut Failure);
 type Step = unsafe extern "C" fn(Handle, *mut Failure);
 type End = unsafe extern "C" fn(Handle);
@@ -319,23 +318,4 @@ fn checked<T>(call: impl FnOnce(*mut Failure) -> T) -> Result<T, String> {
     // SAFETY: the message belongs to the library, and is valid until its next call on this thread.
     let message = unsafe { text_of(failure.message) };
     Err(format!("HELICS reports: {message} ({})", failure.code))
-}
-
-/// A text of the library as one line.
-///
-/// # Safety
-///
-/// The pointer is null or points to a text that ends with a zero.
-unsafe fn text_of(text: Text) -> String {
-    if text.is_null() {
-        return String::new();
-    }
-    // SAFETY: by the condition above.
-    one_line(&unsafe { CStr::from_ptr(text) }.to_string_lossy())
-}
-
-/// A text for the library; the rest behind a zero is left out.
-fn c_text(text: &str) -> CString {
-    let text = text.split('\0').next().unwrap_or_default();
-    CString::new(text).expect("no zero in it")
 }

@@ -1,6 +1,6 @@
 //! Steps per second of an empty run, compared with a bare TCP coordinator (a loop that sends one message to each client
-//! and waits for the answers), and with HELICS if it is installed. The rounds of one run alternate; each client is a
-//! separate process.
+//! and waits for the answers), with the same loop in shared memory, and with HELICS if it is installed. The rounds of one
+//! run alternate; each client is a separate process.
 //!
 //! Medians over the rounds; prints one `rust NAME VALUE` per line on stdout.
 #![allow(missing_docs, reason = "a bench")]
@@ -8,6 +8,9 @@
 
 #[path = "lockstep/helics.rs"]
 mod helics;
+#[cfg(unix)]
+#[path = "lockstep/memory.rs"]
+mod memory;
 
 use std::io::{Read as _, Write as _};
 use std::net::{TcpListener, TcpStream};
@@ -97,13 +100,20 @@ fn main() {
             continue;
         }
         let (mut shared, mut ratios) = (Vec::new(), Vec::new());
+        let (mut bares, mut bares_ratios) = (Vec::new(), Vec::new());
         for _ in 0..rounds {
             let rate = through_memory(2, local, span);
             shared.push(rate);
             ratios.push(rate / bare(2, span));
+            let bare = memory::bare(2 - local, span);
+            bares.push(bare);
+            bares_ratios.push(rate / bare);
         }
         println!("rust sdsp.{name} {:.0}", median(&mut shared));
         println!("rust sdsp.{name}.ratio {:.1}", median(&mut ratios));
+        println!("rust sdsp.{name}.bare {:.0}", median(&mut bares));
+        let ratio = median(&mut bares_ratios);
+        println!("rust sdsp.{name}.bare.ratio {ratio:.2}");
     }
     if wanted("in_process.2") {
         let (mut alone, mut ratios) = (Vec::new(), Vec::new());
@@ -181,6 +191,11 @@ fn client(arguments: &[String]) {
         "shared_memory" => {
             let mut idle = Idle(name.clone(), variables.parse().expect("a number"));
             shared_memory::join(address, &mut idle).expect("it runs");
+        }
+        #[cfg(unix)]
+        "memory" => {
+            let at = name[1..].parse().expect("a number");
+            memory::client(address, at, variables.parse().expect("a number"));
         }
         other => panic!("unknown kind {other}"),
     }

@@ -19,12 +19,14 @@ use tickbus_virtual_time as virtual_time;
 use virtual_time::server::Control;
 #[cfg(unix)]
 use virtual_time::shared_memory;
-use virtual_time::{Cause, Controls, Ended, Hosting, Logic, Meeting, RecordedRun, RunFile, tcp};
+use virtual_time::{
+    Cause, Controls, Ended, Hosting, Logic, Meeting, RecordedRun, RunFile, Save, SavedRun, tcp,
+};
 
 /// Serve virtual time: clients advance in lock-step, and every run gives the same result.
 ///
-/// Type a command per line while it runs: pause, step (or step 10), run, stop. docs/sdsp.md describes the rules, and the
-/// protocol for your own clients.
+/// Type a command per line while it runs: pause, step (or step 10), run, save, stop. docs/sdsp.md describes the rules,
+/// and the protocol for your own clients.
 #[derive(Debug, clap::Args)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 pub(super) struct Arguments {
@@ -42,6 +44,18 @@ pub(super) struct Arguments {
     /// Record what is read in each step to this file: a name ending in .vcd or .csv.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
+
+    /// Keep what a saved run needs, and save the run to this file: on the command save, or at --save-at.
+    #[arg(long, value_name = "FILE")]
+    save_to: Option<PathBuf>,
+
+    /// Save the run after this step; 0 is the initial values.
+    #[arg(long, value_name = "STEP", requires = "save_to")]
+    save_at: Option<u64>,
+
+    /// Continue the run that was saved to this file; its clients join as ever.
+    #[arg(long, value_name = "FILE")]
+    restore: Option<PathBuf>,
 
     /// Serve the live page of the run, and print its address; without HOST:PORT, at 127.0.0.1:20080.
     #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = "", value_parser = page_address)]
@@ -73,6 +87,18 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
         }
     };
     file.settings.paused = arguments.paused;
+    file.settings.save = arguments.save_to.clone().map(|file| Save {
+        file,
+        at: arguments.save_at,
+    });
+    let restored = arguments.restore.as_deref().map(SavedRun::load);
+    file.settings.restore = match restored.transpose() {
+        Ok(restored) => restored,
+        Err(mistake) => {
+            eprintln!("{mistake}\nsync: failed mistakes=1");
+            return Outcome::WrongInput;
+        }
+    };
     let logic = match file.logic.as_deref().map(script).transpose() {
         Ok(logic) => logic.unwrap_or_default(),
         Err(mistakes) => {
@@ -112,6 +138,10 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
         eprintln!("sync: commands on stdin cannot be read: {error}");
     }
     let outcome = serve(file, logic, &controls);
+    if controls.unsaved().is_some() {
+        report(outcome);
+        return Outcome::BusFailed;
+    }
     if let Some(why) = recorded.error() {
         eprintln!("sync: --record: {why}");
         report(outcome);
@@ -260,6 +290,7 @@ fn obey(controls: &Controls) {
             (Some("pause"), None, _) => Some(Control::Pause),
             (Some("run"), None, _) => Some(Control::Run),
             (Some("stop"), None, _) => Some(Control::Stop),
+            (Some("save"), None, _) => Some(Control::Save),
             (Some("step"), None, _) => Some(Control::Step(1)),
             (Some("step"), Some(count), None) => count.parse().ok().map(Control::Step),
             _ => None,
@@ -267,7 +298,7 @@ fn obey(controls: &Controls) {
         match control {
             Some(control) => controls.send(control),
             None => say(&format!(
-                "\"{}\" is not a command; commands are pause, step, step NUMBER, run and stop",
+                "\"{}\" is not a command; commands are pause, step, step NUMBER, run, save and stop",
                 tickbus_base::toml_text::shown(&line)
             )),
         }

@@ -11,7 +11,9 @@ use tickbus_image::signal::DataType;
 use crate::hash::Trace;
 use crate::logic::{Access, Commit, Hook, Logic};
 use crate::members::{Client, Members};
+use crate::saved_run::SavedRun;
 use crate::shared_data::SharedData;
+use crate::step::step_of;
 use crate::{Declaration, Outcome, Step};
 
 /// The state of a run. The names are those of the paper.
@@ -130,6 +132,7 @@ impl<'l> Barrier<'l> {
         let client = |member: &Member| Client {
             name: member.declaration.name.clone(),
             multiple: member.declaration.multiple,
+            interval: member.declaration.interval,
             writes: member.writes.clone(),
         };
         let shown = Members {
@@ -140,10 +143,7 @@ impl<'l> Barrier<'l> {
             length,
             shown: Arc::new(shown),
             state: State::InitialWrite,
-            step: Step {
-                sequence: 0,
-                time: Nanos::ZERO - length,
-            },
+            step: step_of(0, length),
             owing: members.len(),
             next_due: 0,
             members,
@@ -313,6 +313,12 @@ impl<'l> Barrier<'l> {
         }
         self.data.end_commit();
         self.trace.commit(self.step, self.data.committed());
+        self.choose_due();
+        Ok(())
+    }
+
+    /// Determines the clients of the next step.
+    fn choose_due(&mut self) {
         self.state = State::PreRead;
         let next = self.step.sequence + 1;
         self.next_due = u64::MAX;
@@ -320,6 +326,39 @@ impl<'l> Barrier<'l> {
             member.is_due = member.next_update <= next;
             self.next_due = self.next_due.min(member.next_update);
         }
+    }
+
+    /// The step in which a client runs next, between two steps.
+    pub(crate) fn next_update(&self, client: usize) -> u64 {
+        self.members[client].next_update
+    }
+
+    /// Continues a saved run of the same clients: makes all its commits, and shows them to those who read each of them.
+    pub(crate) fn restore(&mut self, saved: &SavedRun) -> Result<(), String> {
+        let memory = &saved.memory;
+        let mut place = memory.start();
+        for sequence in 0..=saved.step {
+            if memory.number(&place) == Some(sequence) {
+                memory.pass(&mut place);
+                self.data.replace(place.values());
+            }
+            self.step = step_of(sequence, self.length);
+            self.trace.commit(self.step, self.data.committed());
+            self.show_commit()?;
+        }
+        if self.trace.hash() != saved.hash {
+            return Err(format!(
+                "the saved run has the trace hash {}, and its values have {}; it was not saved by this tickbus",
+                saved.hash,
+                self.trace.hash()
+            ));
+        }
+        self.owing = 0;
+        for (member, (_, next)) in self.members.iter_mut().zip(&saved.clients) {
+            member.owes = false;
+            member.next_update = *next;
+        }
+        self.choose_due();
         Ok(())
     }
 
@@ -367,8 +406,7 @@ impl<'l> Barrier<'l> {
             member.owes = member.is_due;
             if member.is_due {
                 self.owing += 1;
-                let multiple = u64::from(member.declaration.multiple.get());
-                member.next_update = step.sequence + multiple;
+                member.next_update = member.declaration.next_after(step, self.length);
             }
         }
         self.state = State::Write;

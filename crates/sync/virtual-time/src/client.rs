@@ -6,7 +6,7 @@ use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::DataType;
 
-use crate::participant::step_at;
+use crate::step::step_at;
 use crate::wire::{self, FromServer};
 use crate::{Cause, Declaration, Ended, Outcome, Participant, Step};
 

@@ -7,6 +7,8 @@ use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::{DataType, Slot};
 
+use crate::step::{Step, step_at};
+
 /// The longest name of a client or variable, in bytes of UTF-8.
 pub(crate) const LONGEST_NAME: usize = 255;
 
@@ -20,7 +22,8 @@ pub struct Declaration {
     pub name: String,
     /// How many steps of the server one step of this client takes.
     pub multiple: NonZeroU32,
-    /// The virtual time of one step of this client. The server then derives the multiple.
+    /// The virtual time of one step of this client, in place of the multiple: it runs in the first step at or after each
+    /// whole multiple of this time. At least one step of the server.
     pub interval: Option<Nanos>,
     /// The variables that the client writes, at most 65535. No other client writes them.
     pub writes: Vec<Variable>,
@@ -57,24 +60,40 @@ impl Declaration {
         }
     }
 
-    /// Derives the multiple from the interval, if there is one, at a server with this step.
+    /// Replaces an interval that is a whole number of steps of `step` by the multiple; another one stays.
     ///
     /// # Errors
     ///
-    /// The interval is no multiple of the step, or too large a one.
+    /// The interval is shorter than a step.
     pub(crate) fn fit(&mut self, step: Nanos) -> Result<(), String> {
         let Some(interval) = self.interval else {
             return Ok(());
         };
+        if interval < step {
+            return Err(format!(
+                "its step of {interval} is shorter than the server's, {step}, in which a client runs once at most; \
+                 make the server's step shorter"
+            ));
+        }
         let multiple = u32::try_from(interval.0 / step.0).ok();
         let multiple = multiple.and_then(NonZeroU32::new);
-        let fits = multiple.filter(|_| interval.0 % step.0 == 0);
-        self.multiple = fits.ok_or_else(|| {
-            format!(
-                "its step of {interval} is no whole multiple of the server's, {step}; make one of them fit"
-            )
-        })?;
+        if let Some(multiple) = multiple.filter(|_| interval.0 % step.0 == 0) {
+            (self.multiple, self.interval) = (multiple, None);
+        } else {
+            self.multiple = NonZeroU32::MIN;
+        }
         Ok(())
+    }
+
+    /// The step in which the client runs next after `step`, if it does not ask for another one; the server's steps take
+    /// `length`.
+    pub(crate) fn next_after(&self, step: Step, length: Nanos) -> u64 {
+        let Some(interval) = self.interval else {
+            return step.sequence + u64::from(self.multiple.get());
+        };
+        // From the multiples of the interval, so that rounding up to a step does not add up.
+        let next = (step.time.0 / interval.0 + 1).saturating_mul(interval.0);
+        step_at(Nanos(next), length)
     }
 
     /// The first difference to another declaration of the same client, as text for people.
@@ -82,6 +101,13 @@ impl Declaration {
         if self.multiple != other.multiple {
             let (own, other) = (self.multiple, other.multiple);
             return Some(format!("its multiple was {own}, and is {other}"));
+        }
+        if self.interval != other.interval {
+            let [own, other] = [self, other].map(|one| match one.interval {
+                Some(interval) => interval.to_string(),
+                None => "a whole number of the server's steps".to_owned(),
+            });
+            return Some(format!("its interval was {own}, and is {other}"));
         }
         let writes = |one: &Self| -> Vec<String> {
             let writes = one.writes.iter();

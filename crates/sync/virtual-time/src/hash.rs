@@ -33,7 +33,14 @@ impl Trace {
         trace.word(clients.len() as u64);
         for client in clients {
             trace.text(&client.name);
-            trace.word(client.multiple.get().into());
+            // A multiple is never 0.
+            match client.interval {
+                None => trace.word(client.multiple.get().into()),
+                Some(interval) => {
+                    trace.word(0);
+                    trace.word(interval.0.cast_unsigned());
+                }
+            }
             trace.variables(&client.writes);
         }
         trace.variables(logic);

@@ -22,6 +22,7 @@ struct Asked {
     controls: Vec<Control>,
     wants_view: bool,
     view: Option<RunView>,
+    unsaved: Option<String>,
 }
 
 impl Controls {
@@ -50,6 +51,11 @@ impl Controls {
     /// The requested copy, if it is ready. The first caller takes it.
     pub fn take_view(&self) -> Option<RunView> {
         self.lock().view.take()
+    }
+
+    /// Why the run was not saved, if that was the last result of saving.
+    pub fn unsaved(&self) -> Option<String> {
+        self.lock().unsaved.clone()
     }
 
     fn lock(&self) -> std::sync::MutexGuard<'_, Asked> {
@@ -97,6 +103,30 @@ impl fmt::Debug for Hosting<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Hosting").finish_non_exhaustive()
     }
+}
+
+/// Writes a run that was just saved to its file.
+pub(crate) fn keep(server: &mut Server<'_>, hosting: &mut Hosting<'_>) {
+    let Some(saved) = server.take_saved() else {
+        return;
+    };
+    let written = saved.and_then(|saved| match server.saved_to() {
+        Some(file) => match saved.save(file) {
+            Ok(()) => Ok(format!(
+                "saved after step {} in {}",
+                saved.steps(),
+                file.display()
+            )),
+            Err(error) => Err(format!("{}: {error}", file.display())),
+        },
+        None => Err("there is no file for it".to_owned()),
+    });
+    let line = match &written {
+        Ok(line) => line.clone(),
+        Err(why) => format!("not saved: {why}"),
+    };
+    hosting.controls.lock().unsaved = written.err();
+    (hosting.news)(&line);
 }
 
 /// Passes a frame of the client at `seat`, without its header, to the server.

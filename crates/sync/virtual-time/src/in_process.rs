@@ -36,6 +36,12 @@ pub fn run(
         while let Some((seat, message)) = server.poll() {
             locals.take(seat, &message);
         }
+        if let (Some(Ok(saved)), Some(file)) = (server.take_saved(), server.saved_to())
+            && let Err(error) = saved.save(file)
+        {
+            let reason = format!("the run was not saved: {}: {error}", file.display());
+            return Err(Ended::before(Cause::System, reason));
+        }
         if let Some(outcome) = server.outcome() {
             return outcome.clone();
         }

@@ -3,8 +3,8 @@
 use tickbus_base::time::Nanos;
 
 use crate::client::Asked;
-use crate::participant::step_at;
 use crate::server::{Server, ToClient};
+use crate::step::step_at;
 use crate::{Declaration, Ended, Outcome, Participant};
 
 /// The participants on the server's thread, with their seats.

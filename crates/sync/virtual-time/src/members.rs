@@ -3,6 +3,8 @@
 use std::num::NonZeroU32;
 use std::ops::Range;
 
+use tickbus_base::time::Nanos;
+
 use crate::Variable;
 
 /// The participants of a run, and the variables that they write.
@@ -30,6 +32,8 @@ pub struct Client {
     pub name: String,
     /// The number of server steps per step of this client.
     pub multiple: NonZeroU32,
+    /// The virtual time of one step of this client, in place of the multiple; `None` if it is a whole number of steps.
+    pub interval: Option<Nanos>,
     /// The range of its variables.
     pub writes: Range<usize>,
 }

@@ -7,7 +7,7 @@ use tickbus_base::toml_text::{Collector, Mistakes, Table, Value, load_text, read
 
 use crate::declaration::{LONGEST_NAME, check_name};
 use crate::server::MOST_CLIENTS;
-use crate::{Meeting, Pacing, Settings, StartCondition};
+use crate::{Exchange, Meeting, Pacing, Settings, StartCondition};
 
 /// The content of a run file.
 #[derive(Clone, Debug, PartialEq)]
@@ -115,14 +115,19 @@ fn read(mut table: Table<'_>, folder: &Path) -> Option<RunFile> {
         Some(Some(folder.join(path)))
     });
     let direct = direct.map_or(Some(false), |value| value.boolean());
+    let rejoin = rejoin?;
+    let exchange = if direct? {
+        Exchange::Direct
+    } else {
+        Exchange::ByServer { rejoin }
+    };
     let standard = Settings::new(step?, start?);
     let settings = Settings {
         steps: steps?,
         pacing: pacing?,
         hang: hang?.unwrap_or(standard.hang),
         join: join?.unwrap_or(standard.join),
-        direct: direct?,
-        rejoin: rejoin?,
+        exchange,
         ..standard
     };
     Some(RunFile {
@@ -225,7 +230,9 @@ mod tests {
             pacing: Pacing::Times(2.5),
             hang: Nanos::from_secs(3),
             join: Nanos::from_secs(60),
-            rejoin: Some(Nanos::from_secs(30)),
+            exchange: Exchange::ByServer {
+                rejoin: Some(Nanos::from_secs(30)),
+            },
             ..Settings::new(Nanos::from_millis(2), StartCondition::Names(names))
         };
         assert_eq!(file.settings, expected);

@@ -2,11 +2,12 @@
 
 mod direct;
 mod joining;
-mod memory;
 mod message;
 mod patience;
 mod rejoining;
+mod saving;
 mod showing;
+mod stepping;
 
 use std::collections::{BTreeSet, VecDeque};
 
@@ -22,9 +23,7 @@ use joining::Joining;
 pub(crate) use joining::MOST_CLIENTS;
 pub use message::{Control, ToClient};
 use rejoining::Rejoining;
-
-/// The most states without a due client to pass in a row before anything else is done.
-const EMPTY_STATES: usize = 1000;
+use saving::Saving;
 
 /// The time for the clients to finish a step after the run was stopped.
 const STOP_PATIENCE: Nanos = Nanos::from_secs(1);
@@ -65,7 +64,8 @@ pub struct Server<'l> {
     meeting: Option<Meeting>,
     /// The steps of clients that exchange their values without the server; `None` if the server passes them on.
     allowed: Option<Allowed>,
-    rejoining: Option<Rejoining>,
+    rejoining: Rejoining,
+    saving: Saving,
 }
 
 #[derive(Debug)]
@@ -111,11 +111,18 @@ impl<'l> Server<'l> {
     /// The settings make no sense.
     pub fn new(settings: Settings, logic: Logic<'l>, now: Nanos) -> Result<Self, Mistake> {
         settings.check()?;
+        if (settings.save.is_some() || settings.restore.is_some()) && !logic.is_passive() {
+            return Err(Mistake::new(
+                "a run whose server has logic cannot be saved or restored: the logic may remember anything",
+                "make a client of the logic, or run without saving",
+            ));
+        }
         let joining = Joining::new(&settings.start)?;
         Ok(Self {
             is_paused: settings.paused,
             phase: Phase::Joining(joining, logic),
-            rejoining: settings.rejoin.map(Rejoining::new),
+            rejoining: Rejoining::new(&settings),
+            saving: Saving::new(&settings),
             settings,
             seats: Vec::new(),
             informed: BTreeSet::new(),
@@ -244,6 +251,10 @@ impl<'l> Server<'l> {
             }
             Phase::Joining(joining, _) => declaration
                 .fit(self.settings.step)
+                .and_then(|()| match &self.settings.restore {
+                    Some(saved) => saved.takes(&declaration),
+                    None => Ok(()),
+                })
                 .and_then(|()| joining.join(seat, declaration)),
             Phase::Running(..) => {
                 let fit = declaration.fit(self.settings.step);
@@ -372,6 +383,7 @@ impl<'l> Server<'l> {
                 self.singles = self.singles.saturating_add(count);
             }
             Control::Run => (self.is_paused, self.singles) = (false, 0),
+            Control::Save => self.ask_to_save(),
             Control::Stop => match &self.phase {
                 Phase::Joining(joining, _) => {
                     let reason = format!("stopped while it waited for {}", joining.missing());
@@ -393,6 +405,7 @@ impl<'l> Server<'l> {
         if matches!(self.phase, Phase::Running(..)) && !self.misses_members() {
             self.asked = now;
         }
+        self.rejoining.have_begun(now);
     }
 
     /// The next message, and the seat of its receiver.
@@ -437,107 +450,6 @@ impl<'l> Server<'l> {
         Some((seat, message))
     }
 
-    /// Starts the run: everyone has joined.
-    fn start(&mut self, now: Nanos) {
-        let ended = Phase::Ended(Err(Ended::before(Cause::Configuration, "")));
-        let Phase::Joining(joining, logic) = std::mem::replace(&mut self.phase, ended) else {
-            unreachable!("a run starts once");
-        };
-        let (seats, clients) = joining.into_clients();
-        let mut barrier = match Barrier::new(self.settings.step, clients, logic) {
-            Ok(barrier) => barrier,
-            Err(mistake) => {
-                return self.end_for(Cause::Configuration, None, mistake.to_string());
-            }
-        };
-        self.news
-            .push_back("all have joined: the run starts".to_owned());
-        let started = barrier.start();
-        for (client, seat) in seats.iter().enumerate() {
-            self.seats[*seat] = Seat::Client(client);
-            if self.allowed.is_some() {
-                self.outbox.push_back(Out::Until(*seat));
-            }
-            self.outbox.push_back(Out::Start(*seat));
-        }
-        self.asked = now;
-        self.phase = Phase::Running(Box::new(barrier), seats);
-        if let Err(reason) = started {
-            self.end_for(Cause::Logic, None, of_logic(&reason));
-        }
-    }
-
-    /// Advances as far as possible.
-    fn advance(&mut self, now: Nanos) {
-        for _ in 0..EMPTY_STATES {
-            let misses_members = self.misses_members();
-            let Phase::Running(barrier, seats) = &mut self.phase else {
-                return;
-            };
-            if !barrier.is_synchronised() {
-                return;
-            }
-            if barrier.state() != State::PreRead {
-                self.remember_due();
-                let Phase::Running(barrier, _) = &mut self.phase else {
-                    return;
-                };
-                if let Err(reason) = barrier.commit() {
-                    return self.end_for(Cause::Logic, None, of_logic(&reason));
-                }
-                if let Err(reason) = barrier.show_commit() {
-                    return self.end_for(Cause::System, None, reason);
-                }
-                self.remember_commit();
-                self.ask_again(now);
-                continue;
-            }
-            let Step { sequence, time } = barrier.step();
-            let has_run_ahead =
-                (self.allowed.as_ref()).is_some_and(|allowed| allowed.until() > sequence);
-            let is_idle = self.settings.steps.is_none() && barrier.is_idle_for_ever();
-            let is_last = self.stop_by.is_some() || self.settings.steps == Some(sequence);
-            // In the steps that idle clients are allowed they do nothing.
-            if is_idle || (is_last && !has_run_ahead) {
-                let outcome = barrier.outcome();
-                return self.end(Ok(outcome));
-            }
-            if time.0.checked_add(self.settings.step.0).is_none() {
-                let reason = "virtual time has no room for a further step".to_owned();
-                return self.end_for(Cause::Configuration, None, reason);
-            }
-            if self.allowed.is_some() {
-                if !self.allow_steps(now) {
-                    return;
-                }
-                let Phase::Running(barrier, _) = &mut self.phase else {
-                    return;
-                };
-                self.asked = now;
-                // The clients finish all steps that they are allowed.
-                self.stop_by = self.stop_by.map(|_| now + STOP_PATIENCE);
-                barrier.begin_step().expect("there is no logic");
-                continue;
-            }
-            if (self.is_paused && self.singles == 0) || misses_members {
-                return;
-            }
-            if let Some(interval) = self.settings.pacing.interval(self.settings.step) {
-                let pace = self.pace.get_or_insert_with(|| Pace::new(now, interval));
-                if !pace.take(now) {
-                    return;
-                }
-            }
-            self.singles = self.singles.saturating_sub(1);
-            self.asked = now;
-            if let Err(reason) = barrier.begin_step() {
-                return self.end_for(Cause::Logic, None, of_logic(&reason));
-            }
-            let due = barrier.due().map(|client| Out::Step(seats[client]));
-            self.outbox.extend(due);
-        }
-    }
-
     fn blame(&mut self, seat: usize, cause: Cause, reason: &str) {
         let client = self.name(seat).map(str::to_owned);
         self.end_for(cause, client, reason.to_owned());
@@ -567,6 +479,7 @@ impl<'l> Server<'l> {
             }
         }
         self.phase = Phase::Ended(outcome);
+        self.end_of_saving();
     }
 
     /// Refuses a client before the start.
@@ -606,8 +519,4 @@ impl Out {
             | Self::Refused(seat, _) => *seat,
         }
     }
-}
-
-fn of_logic(reason: &str) -> String {
-    format!("the server's logic failed: {reason}")
 }

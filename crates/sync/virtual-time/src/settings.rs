@@ -1,7 +1,11 @@
 //! The settings of a server.
 
+use std::path::PathBuf;
+
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
+
+use crate::saved_run::SavedRun;
 
 /// The settings of a server.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,11 +24,44 @@ pub struct Settings {
     pub hang: Nanos,
     /// The time limit for all clients to join.
     pub join: Nanos,
-    /// True if the clients exchange their values without the server, if they can: see
-    /// [`ToClient::Meet`](crate::server::ToClient::Meet). The result is the same.
-    pub direct: bool,
-    /// How long the run waits for a member that is lost to come back; `None`: the run ends.
-    pub rejoin: Option<Nanos>,
+    /// How values get from client to client. The result is the same.
+    pub exchange: Exchange,
+    /// The file of a run that is to be saved; the server then keeps in memory all that its clients write.
+    pub save: Option<Save>,
+    /// The saved run that this one continues.
+    pub restore: Option<SavedRun>,
+}
+
+/// How values get from client to client.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Exchange {
+    /// The server passes the values on.
+    ByServer {
+        /// How long the run waits for a member that is lost to come back; `None`: the run ends.
+        rejoin: Option<Nanos>,
+    },
+    /// The clients exchange their values without the server, if they can: see
+    /// [`ToClient::Meet`](crate::server::ToClient::Meet).
+    Direct,
+}
+
+impl Exchange {
+    /// How long the run waits for a member that is lost.
+    pub(crate) const fn rejoin(self) -> Option<Nanos> {
+        match self {
+            Self::ByServer { rejoin } => rejoin,
+            Self::Direct => None,
+        }
+    }
+}
+
+/// Where, and when, a run is saved.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Save {
+    /// The file; an older one is replaced as a whole.
+    pub file: PathBuf,
+    /// The step after which the run is saved; `None`: on [`Control::Save`](crate::server::Control::Save) alone.
+    pub at: Option<u64>,
 }
 
 /// When a run begins.
@@ -57,8 +94,9 @@ impl Settings {
             paused: false,
             hang: Nanos::from_secs(10),
             join: Nanos::MAX,
-            direct: false,
-            rejoin: None,
+            exchange: Exchange::ByServer { rejoin: None },
+            save: None,
+            restore: None,
         }
     }
 }
@@ -70,12 +108,23 @@ impl Settings {
             ("step", self.step),
             ("hang", self.hang),
             ("join", self.join),
-            ("rejoin", self.rejoin.unwrap_or(Nanos::MAX)),
+            ("rejoin", self.exchange.rejoin().unwrap_or(Nanos::MAX)),
         ] {
             if span <= Nanos::ZERO {
                 let what = format!("the span \"{name}\" is {span}");
                 return Err(Mistake::new(what, "it must be longer than no time at all"));
             }
+        }
+        if let (Some(Save { at: Some(at), .. }), Some(steps)) = (&self.save, self.steps)
+            && *at > steps
+        {
+            return Err(Mistake::new(
+                format!("the run is to be saved after step {at}, and ends after step {steps}"),
+                "save it at an earlier step, or let it run longer",
+            ));
+        }
+        if let Some(saved) = &self.restore {
+            self.check_restore(saved)?;
         }
         match self.pacing {
             Pacing::Times(factor) if !(factor.is_finite() && factor > 0.0) => Err(Mistake::new(
@@ -84,6 +133,51 @@ impl Settings {
             )),
             _ => Ok(()),
         }
+    }
+}
+
+impl Settings {
+    /// Checks that this run can continue `saved`.
+    fn check_restore(&self, saved: &SavedRun) -> Result<(), Mistake> {
+        let (step, length) = (saved.step, saved.length);
+        if self.step != length {
+            return Err(Mistake::new(
+                format!(
+                    "the saved run has steps of {length}, and this one of {}",
+                    self.step
+                ),
+                format!("give it steps of {length}"),
+            ));
+        }
+        if let Some(steps) = self.steps.filter(|steps| *steps < step) {
+            return Err(Mistake::new(
+                format!("the run was saved after step {step}, and is to end after step {steps}"),
+                "let it run longer",
+            ));
+        }
+        if let Some(at) = self.save.as_ref().and_then(|save| save.at)
+            && at < step
+        {
+            return Err(Mistake::new(
+                format!("the run was saved after step {step}, and is to be saved after step {at}"),
+                "save it at a later step",
+            ));
+        }
+        let names: Vec<&str> = saved.clients().collect();
+        let are_same = match &self.start {
+            StartCondition::Count(count) => *count == names.len(),
+            StartCondition::Names(expected) => {
+                expected.len() == names.len()
+                    && expected.iter().all(|name| names.contains(&&**name))
+            }
+        };
+        if !are_same {
+            return Err(Mistake::new(
+                format!("the clients are others than those of the saved run: {names:?}"),
+                "let these clients take part",
+            ));
+        }
+        Ok(())
     }
 }
 

@@ -151,6 +151,12 @@ impl SharedData {
         Ok(())
     }
 
+    /// Commits these values of all variables.
+    pub(crate) fn replace(&mut self, values: &[u64]) {
+        self.staged.copy_from_slice(values);
+        self.committed.copy_from_slice(values);
+    }
+
     /// Begins a commit; until its end hooks see the staged values.
     pub(crate) fn begin_commit(&mut self) {
         self.is_committing = true;

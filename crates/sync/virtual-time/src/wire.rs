@@ -4,18 +4,18 @@
 //! little-endian.
 
 mod between;
-mod reader;
 #[cfg(test)]
 mod tests;
 
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::DataType;
 
+pub use crate::bytes::Slots;
+use crate::bytes::{Reader, code, declared, place_code, read_declared, slots};
 use crate::server::ToClient;
-use crate::{Cause, Declaration, Ended, MemberList, Outcome, Step, TraceHash, Variable};
+use crate::{Cause, Declaration, Ended, MemberList, Outcome, Step, TraceHash};
 pub use between::{at, hello, is_done, met, read_hello};
 pub(crate) use between::{done_step, is_end};
-use reader::Reader;
 
 /// The version of this format. Joins of version 1 have no interval, and their clients get no [`ToClient::Waiting`] and
 /// ask for no step. Clients of version 2 exchange nothing with each other.
@@ -54,17 +54,6 @@ const WAITING: u8 = 0x85;
 const MEET: u8 = 0x86;
 const MEMBERS: u8 = 0x87;
 const UNTIL: u8 = 0x88;
-
-/// Slots as they are on the wire.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Slots<'a>(&'a [[u8; 8]]);
-
-impl<'a> Slots<'a> {
-    /// The slots as numbers.
-    pub fn iter(self) -> impl ExactSizeIterator<Item = u64> + use<'a> {
-        self.0.iter().map(|bytes| u64::from_le_bytes(*bytes))
-    }
-}
 
 /// A message of a client.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -197,33 +186,6 @@ pub fn join(out: &mut Vec<u8>, declaration: &Declaration) -> Result<(), String> 
     Ok(())
 }
 
-/// Appends a declaration.
-fn declared(out: &mut Vec<u8>, declaration: &Declaration) {
-    out.extend_from_slice(&declaration.multiple.get().to_le_bytes());
-    let interval = declaration.interval.unwrap_or(Nanos::ZERO);
-    out.extend_from_slice(&interval.0.to_le_bytes());
-    name(out, &declaration.name);
-    count(out, declaration.writes.len());
-    for variable in &declaration.writes {
-        out.push(code(variable.data_type));
-        name(out, &variable.name);
-    }
-    count(out, declaration.reads.len());
-    for read in &declaration.reads {
-        name(out, read);
-    }
-}
-
-fn name(out: &mut Vec<u8>, name: &str) {
-    out.push(u8::try_from(name.len()).expect("a name has its limit"));
-    out.extend_from_slice(name.as_bytes());
-}
-
-fn count(out: &mut Vec<u8>, count: usize) {
-    let count = u16::try_from(count).expect("their number has its limit");
-    out.extend_from_slice(&count.to_le_bytes());
-}
-
 /// Appends the values that a client writes after its run of the step `sequence`. It runs next in the step `next`; 0: as
 /// declared.
 pub fn done(out: &mut Vec<u8>, sequence: u64, next: u64, writes: &[u64]) {
@@ -346,36 +308,6 @@ fn read_join<'a>(reader: &mut Reader<'_>) -> Result<FromClient<'a>, String> {
     })
 }
 
-fn read_declared(reader: &mut Reader<'_>, has_interval: bool) -> Result<Declaration, String> {
-    let multiple = u32::from_le_bytes(reader.take()?).try_into();
-    let multiple = multiple.map_err(|_| "runs every 0 steps; expected 1 or more".to_owned())?;
-    let interval = if has_interval {
-        i64::from_le_bytes(reader.take()?)
-    } else {
-        0
-    };
-    if interval < 0 {
-        return Err(format!("runs every {interval} ns; expected 0 or more"));
-    }
-    let name = reader.name()?.to_owned();
-    let mut writes = Vec::new();
-    for _ in 0..u16::from_le_bytes(reader.take()?) {
-        let data_type = reader.data_type()?;
-        writes.push(Variable::new(reader.name()?, data_type));
-    }
-    let mut reads = Vec::new();
-    for _ in 0..u16::from_le_bytes(reader.take()?) {
-        reads.push(reader.name()?.to_owned());
-    }
-    Ok(Declaration {
-        name,
-        multiple,
-        interval: (interval > 0).then_some(Nanos(interval)),
-        writes,
-        reads,
-    })
-}
-
 /// Reads a message of the server, without its header.
 ///
 /// # Errors
@@ -426,22 +358,6 @@ pub fn from_server(frame: &[u8]) -> Result<FromServer<'_>, String> {
     };
     reader.finish()?;
     Ok(message)
-}
-
-/// The code of a type: BOOL is 1, LREAL 15, in the order of [`DataType::ALL`].
-fn code(data_type: DataType) -> u8 {
-    place_code(DataType::ALL.iter().position(|other| *other == data_type))
-}
-
-fn place_code(place: Option<usize>) -> u8 {
-    let place = place.expect("the list is complete");
-    u8::try_from(place + 1).expect("a short list")
-}
-
-fn slots(out: &mut Vec<u8>, slots: &[u64]) {
-    for slot in slots {
-        out.extend_from_slice(&slot.to_le_bytes());
-    }
 }
 
 /// The first [`LONGEST_REASON`] bytes at most.

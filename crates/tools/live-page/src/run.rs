@@ -254,11 +254,13 @@ impl ShownRun {
         let stations = clients.map(|(at, client)| {
             let view = self.view.as_ref();
             let late = view.filter(|view| owes(view, at) && is_late(view));
-            let state = match (view.map(|view| view.state), client.multiple.get()) {
+            let every = (client.interval, client.multiple.get());
+            let state = match (view.map(|view| view.state), every) {
                 (None | Some(State::Start), _) => "joined".to_owned(),
                 _ if late.is_some() => "late".to_owned(),
-                (_, 1) => "in every step".to_owned(),
-                (_, multiple) => format!("in every step of {multiple}"),
+                (_, (Some(interval), _)) => format!("every {interval}"),
+                (_, (None, 1)) => "in every step".to_owned(),
+                (_, (None, multiple)) => format!("in every step of {multiple}"),
             };
             Station {
                 stale: late.is_some(),

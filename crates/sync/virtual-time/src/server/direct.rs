@@ -8,7 +8,7 @@ use std::hash::{BuildHasher as _, Hasher as _, RandomState};
 use tickbus_base::time::Nanos;
 
 use super::{Out, Phase, Seat, Server};
-use crate::{Declaration, MemberList, Pacing, State};
+use crate::{Declaration, Exchange, MemberList, Pacing, State};
 
 /// How long clients may take to meet.
 const MEETING: Nanos = Nanos::from_secs(10);
@@ -122,7 +122,7 @@ impl Server<'_> {
 
     /// All have joined: lets them meet, if they shall and can, or starts the run.
     pub(super) fn meet_or_start(&mut self, now: Nanos) {
-        if !self.settings.direct || self.settings.rejoin.is_some() {
+        if self.settings.exchange != Exchange::Direct {
             return self.start(now);
         }
         if let Err(why) = self.begin_meeting(now) {
@@ -191,6 +191,9 @@ impl Server<'_> {
         if !logic.is_passive() {
             return Err("the server has logic".to_owned());
         }
+        if self.settings.restore.is_some() {
+            return Err("the run was restored".to_owned());
+        }
         if self.settings.pacing != Pacing::Fast {
             return Err("the run has a pace".to_owned());
         }
@@ -206,19 +209,20 @@ impl Server<'_> {
                     "\"{name}\" cannot exchange values with other clients"
                 ));
             }
+            if declaration.interval.is_some() {
+                // Earlier clients of this version know multiples only.
+                return Err(format!(
+                    "the interval of \"{name}\" is no whole number of steps"
+                ));
+            }
             if declaration.writes.len() > MOST_VALUES {
                 return Err(format!(
                     "\"{name}\" writes more than {MOST_VALUES} variables"
                 ));
             }
         }
-        let member = |(_, declaration): &&(usize, Declaration)| {
-            let fitted = Declaration {
-                interval: None,
-                ..declaration.clone()
-            };
-            (String::new(), fitted)
-        };
+        let member =
+            |(_, declaration): &&(usize, Declaration)| (String::new(), declaration.clone());
         let list = MemberList {
             // Above 0, which belongs to no meeting.
             token: RandomState::new().build_hasher().finish() | 1,

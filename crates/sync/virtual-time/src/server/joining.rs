@@ -107,6 +107,7 @@ impl Joining {
         let client = |(_, declaration): &(usize, Declaration)| Client {
             name: declaration.name.clone(),
             multiple: declaration.multiple,
+            interval: declaration.interval,
             writes: 0..0,
         };
         let mut clients: Vec<Client> = self.joined.iter().map(client).collect();

@@ -14,6 +14,8 @@ pub enum Control {
     Step(u64),
     /// Continues the run.
     Run,
+    /// Saves the run after the current step to the file of [`Settings::save`](crate::Settings::save), and continues.
+    Save,
     /// Ends the run after the current step; the server waits at most a second for clients to finish it.
     Stop,
 }

@@ -117,11 +117,16 @@ impl Server<'_> {
             Phase::Running(barrier, _) => barrier,
             Phase::Ended(_) => return String::new(),
         };
-        if let Some(client) = self.missed().next() {
+        if let Some((client, is_back)) = self.missed().next() {
             let name = shown(&barrier.declaration(client).name);
+            let what = if is_back {
+                "to run its steps again"
+            } else {
+                "to come back"
+            };
             return match self.missed().count() - 1 {
-                0 => format!("\"{name}\" to come back"),
-                more => format!("\"{name}\" and {more} more to come back"),
+                0 => format!("\"{name}\" {what}"),
+                more => format!("\"{name}\" {what}, and for {more} more"),
             };
         }
         let mut owing = (barrier.owing()).map(|client| shown(&barrier.declaration(client).name));

@@ -4,18 +4,21 @@
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::printable;
 
-use super::memory::{Memory, Place};
 use super::{Out, Phase, Seat, Server, ToClient};
 use crate::barrier::State;
-use crate::{Cause, Declaration, Step};
+use crate::memory::{MOST, Memory, Place};
+use crate::step::step_of;
+use crate::{Cause, Declaration, Settings};
 
 /// The members that are missing, and the memory of the run.
 #[derive(Debug)]
 pub(super) struct Rejoining {
-    /// How long the run waits for each of them.
-    limit: Nanos,
-    /// `None` once the run is longer than the memory.
-    memory: Option<Memory>,
+    /// How long the run waits for each of them; `None`: it ends.
+    limit: Option<Nanos>,
+    /// True if the run can be saved.
+    saves: bool,
+    /// `None` if nothing needs it, or once the run is longer than the memory.
+    pub(super) memory: Option<Memory>,
     away: Vec<Away>,
 }
 
@@ -40,13 +43,53 @@ struct Replay {
     reads: Vec<u64>,
 }
 
+impl Replay {
+    /// The member at `seat` is asked from the beginning.
+    fn begin(seat: usize, now: Nanos, memory: &Memory) -> Self {
+        Self {
+            seat,
+            place: memory.start(),
+            asked: Some(0),
+            asked_at: now,
+            reads: Vec::new(),
+        }
+    }
+}
+
 impl Rejoining {
-    pub(super) fn new(limit: Nanos) -> Self {
+    pub(super) fn new(settings: &Settings) -> Self {
+        let (limit, saves) = (settings.exchange.rejoin(), settings.save.is_some());
         Self {
             limit,
-            memory: Some(Memory::default()),
+            saves,
+            memory: (saves || limit.is_some()).then(Memory::default),
             away: Vec::new(),
         }
+    }
+
+    /// The run was restored: the clients at `seats` are asked again for all steps of `memory`.
+    pub(super) fn begin_again(&mut self, now: Nanos, seats: &[usize], memory: Memory) {
+        let away = seats.iter().enumerate().map(|(client, seat)| Away {
+            client,
+            reason: String::new(),
+            since: None,
+            replay: Some(Replay::begin(*seat, now, &memory)),
+        });
+        self.away = away.collect();
+        self.memory = Some(memory);
+    }
+
+    /// The members that have come back were asked for their initial values by `now`.
+    pub(super) fn have_begun(&mut self, now: Nanos) {
+        let replays = self.away.iter_mut().filter_map(|away| away.replay.as_mut());
+        for replay in replays.filter(|replay| replay.asked == Some(0)) {
+            replay.asked_at = now;
+        }
+    }
+
+    /// True if commits are kept.
+    fn keeps(&self) -> bool {
+        self.saves || self.limit.is_some()
     }
 
     fn replay_at(&self, seat: usize) -> Option<&Replay> {
@@ -62,41 +105,42 @@ impl Rejoining {
 impl Server<'_> {
     /// True if a member is missing, or has not caught up yet: no step begins.
     pub(super) fn misses_members(&self) -> bool {
-        (self.rejoining.as_ref()).is_some_and(|rejoining| !rejoining.away.is_empty())
+        !self.rejoining.away.is_empty()
     }
 
     /// True if this client is missing, or has not caught up yet.
     pub(super) fn is_away(&self, client: usize) -> bool {
-        let rejoining = self.rejoining.as_ref();
-        rejoining.is_some_and(|rejoining| rejoining.away_of(client).is_some())
+        self.rejoining.away_of(client).is_some()
     }
 
-    /// The clients that are missing.
-    pub(super) fn missed(&self) -> impl Iterator<Item = usize> {
-        let away = self.rejoining.iter().flat_map(|rejoining| &rejoining.away);
-        away.map(|away| away.client)
+    /// The clients that are missing, or have not caught up yet; true if they are back.
+    pub(super) fn missed(&self) -> impl Iterator<Item = (usize, bool)> {
+        let away = self.rejoining.away.iter();
+        away.map(|away| (away.client, away.replay.is_some()))
     }
 
     /// The step that the memory gets next has these due clients.
     pub(super) fn remember_due(&mut self) {
-        let Phase::Running(barrier, _) = &self.phase else {
+        if !self.rejoining.keeps() {
             return;
-        };
-        if let Some(Rejoining {
-            memory: Some(memory),
-            ..
-        }) = &mut self.rejoining
+        }
+        if let (Phase::Running(barrier, _), Some(memory)) =
+            (&self.phase, &mut self.rejoining.memory)
         {
-            memory.note_due(barrier);
+            memory.note_due(barrier.members().clients.len(), barrier.due());
         }
     }
 
     /// Keeps the commit that was just made.
     pub(super) fn remember_commit(&mut self) {
-        let (Some(rejoining), Phase::Running(barrier, _)) = (&mut self.rejoining, &self.phase)
-        else {
+        let (rejoining, Phase::Running(barrier, _)) = (&mut self.rejoining, &self.phase) else {
             return;
         };
+        if !rejoining.keeps() {
+            // All clients of a restored run have caught up.
+            rejoining.memory = None;
+            return;
+        }
         let Some(memory) = &mut rejoining.memory else {
             return;
         };
@@ -104,8 +148,14 @@ impl Server<'_> {
         // Whoever is missing already is still waited for.
         if !memory.commit(step, barrier.committed()) && rejoining.away.is_empty() {
             rejoining.memory = None;
+            let what = match (rejoining.limit, rejoining.saves) {
+                (None, _) => "the run cannot be saved",
+                (Some(_), false) => "no member can come back any more",
+                (Some(_), true) => "no member can come back any more, and the run cannot be saved",
+            };
             self.news.push_back(format!(
-                "after step {step} no member can come back any more: the memory of the run is full (64 MiB)"
+                "after step {step} {what}: the memory of the run is full ({} MiB)",
+                MOST >> 20
             ));
         }
     }
@@ -116,8 +166,10 @@ impl Server<'_> {
     ///
     /// The run cannot wait for it; the text says why, if the run has the key `rejoin`.
     pub(super) fn wait_for(&mut self, client: usize, reason: &str) -> Result<(), String> {
-        let (Some(rejoining), Phase::Running(barrier, _)) = (&mut self.rejoining, &self.phase)
-        else {
+        let (rejoining, Phase::Running(barrier, _)) = (&mut self.rejoining, &self.phase) else {
+            return Err(String::new());
+        };
+        let Some(limit) = rejoining.limit else {
             return Err(String::new());
         };
         if rejoining.memory.is_none() {
@@ -127,7 +179,6 @@ impl Server<'_> {
             return Err("; a member can come back from step 1 on".to_owned());
         }
         let name = &barrier.declaration(client).name;
-        let limit = rejoining.limit;
         self.news.push_back(format!(
             "client \"{name}\" was lost: {}; the run waits {limit} for it to come back",
             printable(reason)
@@ -155,10 +206,8 @@ impl Server<'_> {
         };
         let step = barrier.step().sequence;
         let started = format!("the run has started, and is at step {step}");
-        let mut away = self
-            .rejoining
-            .iter_mut()
-            .flat_map(|rejoining| &mut rejoining.away);
+        let Rejoining { memory, away, .. } = &mut self.rejoining;
+        let mut away = away.iter_mut();
         let Some(away) =
             away.find(|away| barrier.declaration(away.client).name == declaration.name)
         else {
@@ -176,24 +225,8 @@ impl Server<'_> {
                 declaration.name
             ));
         }
-        let memory = self
-            .rejoining
-            .as_ref()
-            .and_then(|rejoining| rejoining.memory.as_ref());
-        let place = memory.expect("kept while members are missing").start();
-        let mut away = self
-            .rejoining
-            .iter_mut()
-            .flat_map(|rejoining| &mut rejoining.away);
-        let away = away.find(|away| barrier.declaration(away.client).name == declaration.name);
-        let away = away.expect("found above");
-        away.replay = Some(Replay {
-            seat,
-            place,
-            asked: Some(0),
-            asked_at: now,
-            reads: Vec::new(),
-        });
+        let memory = memory.as_ref().expect("kept while members are missing");
+        away.replay = Some(Replay::begin(seat, now, memory));
         seats[away.client] = seat;
         self.seats[seat] = Seat::Back(away.client);
         self.outbox.push_back(Out::Start(seat));
@@ -206,14 +239,9 @@ impl Server<'_> {
 
     /// The message of a step that is asked for again.
     pub(super) fn replayed(&self, seat: usize) -> Option<ToClient<'_>> {
-        let replay = self.rejoining.as_ref()?.replay_at(seat)?;
-        let sequence = replay.asked?;
-        let before = i64::try_from(sequence).ok()? - 1;
+        let replay = self.rejoining.replay_at(seat)?;
         Some(ToClient::Step {
-            step: Step {
-                sequence,
-                time: Nanos(before * self.settings.step.0),
-            },
+            step: step_of(replay.asked?, self.settings.step),
             reads: &replay.reads,
         })
     }
@@ -226,8 +254,7 @@ impl Server<'_> {
         sequence: u64,
         values: impl ExactSizeIterator<Item = u64>,
     ) {
-        let (Some(rejoining), Phase::Running(barrier, _)) = (&mut self.rejoining, &self.phase)
-        else {
+        let (rejoining, Phase::Running(barrier, _)) = (&mut self.rejoining, &self.phase) else {
             return;
         };
         let memory = rejoining.memory.as_ref();
@@ -279,8 +306,7 @@ impl Server<'_> {
 
     /// Asks all members that have come back for their next steps. Members that have caught up take part again.
     pub(super) fn ask_again(&mut self, now: Nanos) {
-        let (Some(rejoining), Phase::Running(barrier, _)) = (&mut self.rejoining, &self.phase)
-        else {
+        let (rejoining, Phase::Running(barrier, _)) = (&mut self.rejoining, &self.phase) else {
             return;
         };
         let Some(memory) = &rejoining.memory else {
@@ -318,16 +344,15 @@ impl Server<'_> {
 
     /// When the next patience ends.
     pub(super) fn rejoin_deadline(&self) -> Nanos {
-        let Some(rejoining) = &self.rejoining else {
-            return Nanos::MAX;
-        };
+        let rejoining = &self.rejoining;
+        let limit = rejoining.limit.unwrap_or(Nanos::MAX);
         let ends = rejoining
             .away
             .iter()
             .map(|away| match (&away.replay, away.since) {
                 (Some(replay), _) if replay.asked.is_some() => replay.asked_at + self.settings.hang,
                 (Some(_), _) => Nanos::MAX,
-                (None, Some(since)) => since + rejoining.limit,
+                (None, Some(since)) => since + limit,
                 (None, None) => Nanos::ZERO,
             });
         ends.min().unwrap_or(Nanos::MAX)
@@ -335,11 +360,11 @@ impl Server<'_> {
 
     /// Ends the run for a member that does not come back in time.
     pub(super) fn check_rejoin(&mut self, now: Nanos) {
-        let (Some(rejoining), Phase::Running(barrier, _)) = (&mut self.rejoining, &self.phase)
-        else {
+        let (rejoining, Phase::Running(barrier, _)) = (&mut self.rejoining, &self.phase) else {
             return;
         };
-        let (limit, hang) = (rejoining.limit, self.settings.hang);
+        let limit = rejoining.limit.unwrap_or(Nanos::MAX);
+        let hang = self.settings.hang;
         let mut end = None;
         for away in &mut rejoining.away {
             let since = *away.since.get_or_insert(now);

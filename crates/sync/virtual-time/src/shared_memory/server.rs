@@ -9,10 +9,12 @@ use tickbus_base::time::Nanos;
 use super::layout;
 use super::mailbox::Mailbox;
 use super::patience::Patience;
-use crate::hosting::{Hosting, hear};
+use crate::hosting::{Hosting, hear, keep};
 use crate::local::Locals;
 use crate::server::ToClient;
-use crate::{Cause, Ended, Logic, Outcome, Participant, Settings, StartCondition, server, wire};
+use crate::{
+    Cause, Ended, Exchange, Logic, Outcome, Participant, Settings, StartCondition, server, wire,
+};
 
 /// How often to do everything else while steps follow each other.
 const ROUND: Nanos = Nanos::from_millis(10);
@@ -88,9 +90,12 @@ impl Listener {
     ) -> Result<Outcome, Ended> {
         let now = hosting.clock.now();
         // Clients through shared memory cannot meet; the server is no detour for them.
-        let settings = Settings {
-            direct: false,
-            ..settings
+        let settings = match settings.exchange {
+            Exchange::Direct => Settings {
+                exchange: Exchange::ByServer { rejoin: None },
+                ..settings
+            },
+            Exchange::ByServer { .. } => settings,
         };
         let mut server = server::Server::new(settings, logic, now)
             .map_err(|mistake| Ended::before(Cause::Configuration, mistake.to_string()))?;
@@ -201,6 +206,7 @@ impl Host<'_, '_, '_> {
     /// Sends all messages.
     fn send(&mut self, now: Nanos) {
         let mut has_asked = false;
+        keep(&mut self.server, &mut self.hosting);
         loop {
             while let Some(line) = self.server.news() {
                 (self.hosting.news)(&line);

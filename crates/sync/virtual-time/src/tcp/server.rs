@@ -11,7 +11,7 @@ use tickbus_base::time::{Nanos, Simulation};
 use tickbus_net::{Acceptor, Address, LocalAddress, bind};
 
 use super::connection::{Arrived, BLOCKED, Connection};
-use crate::hosting::{Hosting, hear};
+use crate::hosting::{Hosting, hear, keep};
 use crate::local::Locals;
 use crate::server::ToClient;
 use crate::{Cause, Ended, Logic, Outcome, Participant, Settings, server};
@@ -210,6 +210,7 @@ impl Host<'_, '_, '_> {
     /// Sends all messages.
     fn send(&mut self, now: Nanos) {
         let mut has_asked = false;
+        keep(&mut self.server, &mut self.hosting);
         loop {
             while let Some(line) = self.server.news() {
                 (self.hosting.news)(&line);

@@ -2,12 +2,11 @@
 
 use tickbus_base::time::Nanos;
 
-use super::reader::Reader;
 use super::{
-    AT, DIRECT, DONE, DONE_UNTIL, ENDED, FINISHED, HELLO, LONGEST_FRAME, MAGIC, MET, append, count,
-    cut, declared, name, read_declared,
+    AT, DIRECT, DONE, DONE_UNTIL, ENDED, FINISHED, HELLO, LONGEST_FRAME, MAGIC, MET, append, cut,
 };
 use crate::MemberList;
+use crate::bytes::{Reader, count, declared, name, read_declared};
 
 /// The longest address, in bytes.
 pub(super) const LONGEST_ADDRESS: usize = 255;

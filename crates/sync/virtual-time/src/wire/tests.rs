@@ -1,6 +1,7 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::Variable;
 
 fn declaration() -> impl Strategy<Value = Declaration> {
     let name = "[a-zä%.]{1,40}";

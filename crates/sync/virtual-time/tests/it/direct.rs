@@ -10,7 +10,7 @@ use tickbus_base::time::{Monotonic, Nanos};
 use tickbus_net::Address;
 use tickbus_virtual_time::server::Control;
 use tickbus_virtual_time::{
-    Cause, Controls, Declaration, Ended, Hosting, Logic, MemberList, Mesh, Next, Outcome,
+    Cause, Controls, Declaration, Ended, Exchange, Hosting, Logic, MemberList, Mesh, Next, Outcome,
     Participant, Settings, Step, in_process, tcp, wire,
 };
 
@@ -74,7 +74,7 @@ fn boxed<'c, P: Participant + Send + 'c>(clients: Vec<P>) -> Vec<Box<dyn Partici
 
 fn direct(settings: Settings) -> Settings {
     Settings {
-        direct: true,
+        exchange: Exchange::Direct,
         ..settings
     }
 }

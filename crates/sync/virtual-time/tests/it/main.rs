@@ -8,6 +8,7 @@ mod next_update;
 mod recording;
 mod rejoin;
 mod rules;
+mod saving;
 mod sequences;
 mod server;
 mod transports;

@@ -7,8 +7,8 @@ use tickbus_image::signal::DataType;
 use tickbus_net::Address;
 use tickbus_virtual_time::server::{Server, ToClient};
 use tickbus_virtual_time::{
-    Controls, Declaration, Hosting, Logic, Participant, Settings, Step, Variable, hear, in_process,
-    tcp, wire,
+    Controls, Declaration, Exchange, Hosting, Logic, Participant, Settings, Step, Variable, hear,
+    in_process, tcp, wire,
 };
 
 use crate::common::{client, settings};
@@ -203,7 +203,11 @@ fn a_run_without_an_end_is_over_when_no_client_wants_to_run_again() {
     assert_eq!((expected.steps, &*events.ran), (9, &[1, 4, 8, 9][..]));
     for direct in [false, true] {
         let settings = Settings {
-            direct,
+            exchange: if direct {
+                Exchange::Direct
+            } else {
+                Exchange::ByServer { rejoin: None }
+            },
             ..endless.clone()
         };
         let listener = tcp::Listener::bind(&Address::local(0)).expect("a free port");

@@ -3,14 +3,13 @@
 use std::sync::Mutex;
 use std::thread;
 
+use crate::common::{run_until, serve};
 use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
 use tickbus_image::signal::DataType;
-use tickbus_net::Address;
-use tickbus_virtual_time::client::{Asked, Client, Connection};
 use tickbus_virtual_time::server::Control;
 use tickbus_virtual_time::{
-    Cause, Controls, Declaration, Ended, Hosting, Logic, Outcome, Participant, Settings,
-    StartCondition, Step, Variable, in_process, tcp,
+    Cause, Declaration, Exchange, Logic, Participant, Settings, StartCondition, Step, Variable,
+    in_process, tcp,
 };
 
 const STEPS: u64 = 60;
@@ -80,61 +79,11 @@ fn settings() -> Settings {
     let names = ["a", "b"].map(str::to_owned).to_vec();
     Settings {
         steps: Some(STEPS),
-        rejoin: Some(Nanos::from_secs(30)),
+        exchange: Exchange::ByServer {
+            rejoin: Some(Nanos::from_secs(30)),
+        },
         hang: Nanos::from_secs(20),
         ..Settings::new(Nanos::from_millis(1), StartCondition::Names(names))
-    }
-}
-
-/// A run over TCP, with what `clients` does at its address, and its news.
-fn serve<T>(
-    settings: Settings,
-    clients: impl FnOnce(&Address, &Controls, &Mutex<Vec<String>>) -> T,
-) -> (Result<Outcome, Ended>, Vec<String>, T) {
-    let listener = tcp::Listener::bind(&Address::local(0)).expect("a free port");
-    let address = Address::local(listener.address().port());
-    let controls = Controls::default();
-    let news = Mutex::new(Vec::new());
-    let (outcome, made) = thread::scope(|scope| {
-        let server = scope.spawn(|| {
-            let hosting = Hosting {
-                clock: &*Monotonic::shared(),
-                controls: &controls,
-                news: &mut |line| news.lock().expect("no panic").push(line.to_owned()),
-            };
-            listener.run(settings, Logic::new(), hosting)
-        });
-        let made = clients(&address, &controls, &news);
-        (server.join().expect("no panic"), made)
-    });
-    (outcome, news.into_inner().expect("no panic"), made)
-}
-
-fn connect(address: &Address, declaration: Declaration) -> Connection {
-    let client = Client::new(declaration).expect("right");
-    let clock = Monotonic::shared() as _;
-    tcp::connect(address, client, &clock, &Stop::new()).expect("it listens")
-}
-
-/// Runs `mixer` until it has got the step `last`, and breaks the connection: before it has answered if `owing`, otherwise
-/// afterwards.
-fn run_until(address: &Address, mut mixer: Mixer, last: u64, owing: bool) {
-    let mut connection = connect(address, mixer.declare());
-    let mut writes = vec![0; 2];
-    loop {
-        match connection.wait(Nanos::from_secs(20)).expect("it runs") {
-            Asked::Initial => mixer.initial(&mut writes),
-            Asked::Step(step) if step.sequence >= last && owing => return,
-            Asked::Step(step) => {
-                let reads = connection.client().reads().to_vec();
-                mixer.run(step, &reads, &mut writes).expect("it can");
-                if step.sequence >= last {
-                    return connection.answer_until(&writes, mixer.next_update());
-                }
-            }
-            Asked::End(end) => panic!("it ended: {end:?}"),
-        }
-        connection.answer_until(&writes, mixer.next_update());
     }
 }
 
@@ -164,15 +113,15 @@ fn a_run_whose_members_are_lost_and_come_back_is_the_undisturbed_one() {
         let undisturbed = in_process::run(settings(), vec![&mut a(), &mut b()], Logic::new());
         let undisturbed = undisturbed.expect("it runs");
         for owing in [true, false] {
-            let (outcome, news, joined) = serve(settings(), |address, _, news| {
+            let (outcome, news, joined) = serve(settings(), Logic::new(), |address, _, news| {
                 thread::scope(|scope| {
                     let other = scope.spawn(|| {
-                        run_until(address, b(), 30, owing);
+                        run_until(address, &mut b(), 30, owing);
                         await_news(news, "client \"b\" was lost", 1);
                         tcp::join(address, &mut b())
                     });
                     for (times, last) in [(1, 10), (2, 20)] {
-                        run_until(address, a(), last, owing);
+                        run_until(address, &mut a(), last, owing);
                         await_news(news, "client \"a\" was lost", times);
                     }
                     let outcome = tcp::join(address, &mut a());
@@ -201,11 +150,11 @@ fn members_that_are_all_lost_come_back_in_any_order() {
         vec![&mut Mixer::new("a", "b", 1), &mut Mixer::new("b", "a", 2)],
         Logic::new(),
     );
-    let (outcome, news, joined) = serve(settings(), |address, controls, news| {
+    let (outcome, news, joined) = serve(settings(), Logic::new(), |address, controls, news| {
         controls.send(Control::Step(10));
         thread::scope(|scope| {
-            scope.spawn(|| run_until(address, Mixer::new("a", "b", 1), 8, true));
-            scope.spawn(|| run_until(address, Mixer::new("b", "a", 2), 7, false));
+            scope.spawn(|| run_until(address, &mut Mixer::new("a", "b", 1), 8, true));
+            scope.spawn(|| run_until(address, &mut Mixer::new("b", "a", 2), 7, false));
         });
         await_news(news, "was lost", 2);
         controls.send(Control::Run);
@@ -222,10 +171,10 @@ fn members_that_are_all_lost_come_back_in_any_order() {
 
 #[test]
 fn a_member_that_computes_something_else_ends_the_run_with_the_variable() {
-    let (outcome, ..) = serve(settings(), |address, _, news| {
+    let (outcome, ..) = serve(settings(), Logic::new(), |address, _, news| {
         thread::scope(|scope| {
             scope.spawn(|| tcp::join(address, &mut Mixer::new("b", "a", 1)));
-            run_until(address, Mixer::new("a", "b", 1), 10, true);
+            run_until(address, &mut Mixer::new("a", "b", 1), 10, true);
             await_news(news, "was lost", 1);
             let mut other = Mixer {
                 salt: 4,
@@ -245,16 +194,19 @@ fn a_member_that_computes_something_else_ends_the_run_with_the_variable() {
 
 #[test]
 fn a_member_that_stays_away_or_is_another_one_is_told() {
-    let rejoin = Some(Nanos::from_millis(300));
+    let exchange = Exchange::ByServer {
+        rejoin: Some(Nanos::from_millis(300)),
+    };
     let (outcome, news, ()) = serve(
         Settings {
-            rejoin,
+            exchange,
             ..settings()
         },
+        Logic::new(),
         |address, _, news| {
             thread::scope(|scope| {
                 scope.spawn(|| tcp::join(address, &mut Mixer::new("b", "a", 1)));
-                run_until(address, Mixer::new("a", "b", 1), 10, true);
+                run_until(address, &mut Mixer::new("a", "b", 1), 10, true);
                 await_news(news, "was lost", 1);
                 let refused =
                     tcp::join(address, &mut Mixer::new("a", "b", 2)).expect_err("it differs");
@@ -287,10 +239,10 @@ fn a_member_that_stays_away_or_is_another_one_is_told() {
 
 #[test]
 fn a_run_that_waits_for_a_member_can_be_stopped() {
-    let (outcome, ..) = serve(settings(), |address, controls, news| {
+    let (outcome, ..) = serve(settings(), Logic::new(), |address, controls, news| {
         thread::scope(|scope| {
             scope.spawn(|| tcp::join(address, &mut Mixer::new("b", "a", 1)));
-            run_until(address, Mixer::new("a", "b", 1), 10, true);
+            run_until(address, &mut Mixer::new("a", "b", 1), 10, true);
             await_news(news, "was lost", 1);
             controls.send(Control::Stop);
         });

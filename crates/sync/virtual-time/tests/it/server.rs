@@ -416,11 +416,12 @@ fn a_client_that_states_its_interval_has_a_step_for_each() {
         ..Declaration::new(name)
     };
     let seat = server.connected(Nanos::ZERO);
-    server.join(Nanos::ZERO, seat, with("a", 2_500));
+    server.join(Nanos::ZERO, seat, with("a", 999));
     let (_, ended) = refusal(&mut server);
     assert_eq!(
         ended.reason,
-        "its step of 2500us is no whole multiple of the server's, 1ms; make one of them fit"
+        "its step of 999us is shorter than the server's, 1ms, in which a client runs once at most; make the server's step \
+         shorter"
     );
     let seats = [("a", 3_000), ("b", 1_000)].map(|(name, micros)| {
         let seat = server.connected(Nanos::ZERO);

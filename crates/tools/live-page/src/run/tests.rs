@@ -37,6 +37,7 @@ fn members() -> Arc<Members> {
     let client = |name: &str, writes| Client {
         name: name.to_owned(),
         multiple: NonZeroU32::MIN,
+        interval: None,
         writes,
     };
     Arc::new(Members {

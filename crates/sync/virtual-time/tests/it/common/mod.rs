@@ -3,10 +3,17 @@
 #![allow(dead_code, reason = "each test uses some of it")]
 
 use std::num::NonZeroU32;
+use std::sync::Mutex;
+use std::thread;
 
-use tickbus_base::time::Nanos;
+use tickbus_base::time::{Monotonic, Nanos, Stop};
 use tickbus_image::signal::DataType;
-use tickbus_virtual_time::{Declaration, Participant, Settings, StartCondition, Step, Variable};
+use tickbus_net::Address;
+use tickbus_virtual_time::client::{Asked, Client as ClientOf, Connection};
+use tickbus_virtual_time::{
+    Controls, Declaration, Ended, Hosting, Logic, Outcome, Participant, Settings, StartCondition,
+    Step, Variable, tcp,
+};
 
 /// A client made of a function.
 pub(crate) struct Client<F> {
@@ -70,6 +77,14 @@ pub(crate) fn mixers(count: u32) -> Vec<Mixer> {
         .collect()
 }
 
+impl Mixer {
+    /// Lets it run at every multiple of `interval`.
+    pub(crate) fn every(&mut self, interval: Nanos) {
+        self.declaration.multiple = NonZeroU32::MIN;
+        self.declaration.interval = Some(interval);
+    }
+}
+
 impl Participant for Mixer {
     fn declare(&self) -> Declaration {
         self.declaration.clone()
@@ -106,5 +121,64 @@ pub(crate) fn mixer_settings(steps: u64, count: u32) -> Settings {
     Settings {
         steps: Some(steps),
         ..Settings::new(Nanos::from_millis(1), start)
+    }
+}
+
+/// A run over TCP, with what `clients` does at its address, and its news.
+pub(crate) fn serve<T>(
+    settings: Settings,
+    logic: Logic<'_>,
+    clients: impl FnOnce(&Address, &Controls, &Mutex<Vec<String>>) -> T,
+) -> (Result<Outcome, Ended>, Vec<String>, T) {
+    let listener = tcp::Listener::bind(&Address::local(0)).expect("a free port");
+    let address = Address::local(listener.address().port());
+    let controls = Controls::default();
+    let news = Mutex::new(Vec::new());
+    let (outcome, made) = thread::scope(|scope| {
+        let server = scope.spawn(|| {
+            let hosting = Hosting {
+                clock: &*Monotonic::shared(),
+                controls: &controls,
+                news: &mut |line| news.lock().expect("no panic").push(line.to_owned()),
+            };
+            listener.run(settings, logic, hosting)
+        });
+        let made = clients(&address, &controls, &news);
+        (server.join().expect("no panic"), made)
+    });
+    (outcome, news.into_inner().expect("no panic"), made)
+}
+
+fn connect(address: &Address, declaration: Declaration) -> Connection {
+    let client = ClientOf::new(declaration).expect("right");
+    let clock = Monotonic::shared() as _;
+    tcp::connect(address, client, &clock, &Stop::new()).expect("it listens")
+}
+
+/// Runs `participant` until it has got the step `last`, and breaks the connection: before it has answered if `owing`, otherwise
+/// afterwards.
+pub(crate) fn run_until(
+    address: &Address,
+    participant: &mut dyn Participant,
+    last: u64,
+    owing: bool,
+) {
+    let declaration = participant.declare();
+    let mut writes = vec![0; declaration.writes.len()];
+    let mut connection = connect(address, declaration);
+    loop {
+        match connection.wait(Nanos::from_secs(20)).expect("it runs") {
+            Asked::Initial => participant.initial(&mut writes),
+            Asked::Step(step) if step.sequence >= last && owing => return,
+            Asked::Step(step) => {
+                let reads = connection.client().reads().to_vec();
+                participant.run(step, &reads, &mut writes).expect("it can");
+                if step.sequence >= last {
+                    return connection.answer_until(&writes, participant.next_update());
+                }
+            }
+            Asked::End(end) => panic!("it ended: {end:?}"),
+        }
+        connection.answer_until(&writes, participant.next_update());
     }
 }

@@ -1,0 +1,314 @@
+//! Runs that were saved at a step, as files.
+//!
+//! The file has the clients, all commits up to the step, and when each client runs next. In the restored run every client
+//! runs its steps again from what it had read, as a member that comes back does; so no client has to be able to save its
+//! state, and a client that computes something else is noticed.
+//!
+//! All numbers are little-endian: `TICKSYNC`, 4 bytes version, 8 bytes length of the content, the content, and 8 bytes
+//! SipHash-2-4 of all bytes before, with a key of zeros.
+
+use std::fs::{self, File};
+use std::hash::Hasher as _;
+use std::io::{self, Read as _, Write as _};
+use std::path::{Path, PathBuf};
+
+use siphasher::sip::SipHasher24;
+use tickbus_base::Mistake;
+use tickbus_base::time::Nanos;
+
+use crate::bytes::{Reader, count, declared, read_declared};
+use crate::memory::{self, Memory};
+use crate::{Declaration, TraceHash};
+
+/// The first bytes of a file.
+const MAGIC: [u8; 8] = *b"TICKSYNC";
+
+/// The version of the format.
+const VERSION: u32 = 1;
+
+/// The bytes in front of the content.
+const HEAD: usize = 20;
+
+/// The bytes behind the content.
+const TAIL: usize = 8;
+
+/// The largest file: the memory of a run, and the names of its clients and variables.
+const LARGEST: u64 = 2 * memory::MOST as u64 + (64 << 20);
+
+/// A run that was saved at a step.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SavedRun {
+    /// The virtual time of one step.
+    pub(crate) length: Nanos,
+    /// The last step that was committed.
+    pub(crate) step: u64,
+    /// The trace hash up to this step.
+    pub(crate) hash: TraceHash,
+    /// The clients in the order of their names, each with the step in which it runs next.
+    pub(crate) clients: Vec<(Declaration, u64)>,
+    /// All commits.
+    pub(crate) memory: Memory,
+}
+
+impl SavedRun {
+    /// The number of steps that had been committed when the run was saved.
+    pub const fn steps(&self) -> u64 {
+        self.step
+    }
+
+    /// The trace hash of these steps.
+    pub const fn hash(&self) -> TraceHash {
+        self.hash
+    }
+
+    /// The names of the clients, in their order.
+    pub fn clients(&self) -> impl ExactSizeIterator<Item = &str> {
+        self.clients
+            .iter()
+            .map(|(declaration, _)| &*declaration.name)
+    }
+
+    /// Checks that a client is the one that it was, or returns the difference.
+    pub(crate) fn takes(&self, declaration: &Declaration) -> Result<(), String> {
+        let name = &declaration.name;
+        let mut clients = self.clients.iter();
+        let Some((was, _)) = clients.find(|(was, _)| was.name == *name) else {
+            return Err(format!(
+                "the saved run has no client of the name \"{name}\""
+            ));
+        };
+        match was.difference(declaration) {
+            Some(difference) => Err(format!(
+                "in the saved run \"{name}\" declared other things: {difference}"
+            )),
+            None => Ok(()),
+        }
+    }
+
+    /// Reads the file at `path`.
+    ///
+    /// # Errors
+    ///
+    /// The file cannot be read, is no saved run, or is damaged: the text begins with the path, and names the byte.
+    pub fn load(path: &Path) -> Result<Self, Mistake> {
+        let shown = path.display();
+        let bytes = read(path).map_err(|error| {
+            Mistake::new(
+                format!("{shown}: {error}"),
+                "write the path of a file that tickbus sync --save-to has written",
+            )
+        })?;
+        Self::parse(&bytes).map_err(|(at, what)| {
+            Mistake::new(
+                format!("{shown}: byte {at}: {what}"),
+                "restore another file, or begin the run from its start",
+            )
+        })
+    }
+
+    /// Writes the file at `path`: first beside it, so that an older file stays until this one is complete.
+    ///
+    /// # Errors
+    ///
+    /// The file cannot be written.
+    pub fn save(&self, path: &Path) -> io::Result<()> {
+        let mut part = path.as_os_str().to_owned();
+        part.push(".part");
+        let part = PathBuf::from(part);
+        let written = (|| {
+            let mut file = File::create(&part)?;
+            file.write_all(&self.to_bytes())?;
+            file.sync_all()?;
+            drop(file);
+            fs::rename(&part, path)
+        })();
+        if written.is_err() {
+            let _ = fs::remove_file(&part);
+        }
+        written
+    }
+
+    /// The content of the file.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let mut out = Vec::new();
+        out.extend_from_slice(&MAGIC);
+        out.extend_from_slice(&VERSION.to_le_bytes());
+        out.extend_from_slice(&[0; 8]);
+        out.extend_from_slice(&self.length.0.to_le_bytes());
+        out.extend_from_slice(&self.step.to_le_bytes());
+        out.extend_from_slice(&self.hash.0.to_le_bytes());
+        count(&mut out, self.clients.len());
+        for (declaration, next) in &self.clients {
+            declared(&mut out, declaration);
+            out.extend_from_slice(&next.to_le_bytes());
+        }
+        self.memory.write(&mut out);
+        let content = (out.len() - HEAD) as u64;
+        out[HEAD - 8..HEAD].copy_from_slice(&content.to_le_bytes());
+        let sum = sum(&out);
+        out.extend_from_slice(&sum.to_le_bytes());
+        out
+    }
+
+    /// Reads the content of a file.
+    ///
+    /// # Errors
+    ///
+    /// The byte at which it is wrong, and what is wrong.
+    pub fn parse(bytes: &[u8]) -> Result<Self, (usize, String)> {
+        let begin = bytes.len().min(MAGIC.len());
+        if bytes[..begin] != MAGIC[..begin] {
+            return Err((0, "this is no saved run".to_owned()));
+        }
+        let cut = || (bytes.len(), "the file is cut".to_owned());
+        let (head, rest) = bytes.split_at_checked(HEAD).ok_or_else(cut)?;
+        let mut reader = Reader::new(&head[MAGIC.len()..]);
+        let at_head = |what| (MAGIC.len(), what);
+        let version = reader.half().map_err(at_head)?;
+        if version != VERSION {
+            let what =
+                format!("the file has version {version}, and this tickbus reads version {VERSION}");
+            return Err(at_head(what));
+        }
+        let length = reader.word().map_err(at_head)?;
+        let end = usize::try_from(length).unwrap_or(usize::MAX);
+        let (content, tail) = rest.split_at_checked(end).ok_or_else(cut)?;
+        let stored: [u8; TAIL] = match tail.len() {
+            0..TAIL => return Err(cut()),
+            TAIL => tail.try_into().expect("8 bytes"),
+            _ => {
+                let what = "the file is longer than it says".to_owned();
+                return Err((HEAD + end + TAIL, what));
+            }
+        };
+        if sum(&bytes[..HEAD + end]) != u64::from_le_bytes(stored) {
+            let what = "the file is damaged: its checksum is another one".to_owned();
+            return Err((HEAD + end, what));
+        }
+        Self::read(content).map_err(|what| (HEAD, format!("the content is wrong: it {what}")))
+    }
+
+    fn read(content: &[u8]) -> Result<Self, String> {
+        let mut reader = Reader::new(content);
+        let length = Nanos(reader.word()?.cast_signed());
+        if length <= Nanos::ZERO {
+            return Err(format!("has steps of {length}"));
+        }
+        let step = reader.word()?;
+        if step > (i64::MAX / length.0).unsigned_abs() {
+            return Err(format!("ends with step {step}, behind all virtual time"));
+        }
+        let hash = TraceHash(reader.word()?);
+        let mut clients: Vec<(Declaration, u64)> = Vec::new();
+        for _ in 0..u16::from_le_bytes(reader.take()?) {
+            let declaration = read_declared(&mut reader, true)?;
+            clients.push((declaration, reader.word()?));
+        }
+        if !clients.is_sorted_by(|a, b| a.0.name < b.0.name) {
+            return Err("has clients that are not in the order of their names".to_owned());
+        }
+        let variables = clients
+            .iter()
+            .map(|(declaration, _)| declaration.writes.len());
+        let size = (clients.len(), variables.sum());
+        let memory = Memory::read(&mut reader, size, step)
+            .map_err(|what| format!("has a memory that is wrong: {what}"))?;
+        reader.finish()?;
+        Ok(Self {
+            length,
+            step,
+            hash,
+            clients,
+            memory,
+        })
+    }
+}
+
+fn read(path: &Path) -> io::Result<Vec<u8>> {
+    let file = File::open(path)?;
+    let mut bytes = Vec::new();
+    file.take(LARGEST + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > LARGEST {
+        let what = format!("the file is larger than {LARGEST} bytes, as no saved run is");
+        return Err(io::Error::other(what));
+    }
+    Ok(bytes)
+}
+
+fn sum(bytes: &[u8]) -> u64 {
+    let mut hasher = SipHasher24::new();
+    hasher.write(bytes);
+    hasher.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Variable;
+    use tickbus_image::signal::DataType;
+
+    fn saved() -> SavedRun {
+        let mut plc = Declaration::new("plc");
+        plc.writes.push(Variable::new("go", DataType::Bool));
+        let mut tank = Declaration::new("tank");
+        tank.reads.push("go".to_owned());
+        let mut memory = Memory::default();
+        memory.note_due(2, 0..2);
+        assert!(memory.commit(0, &[0]));
+        memory.note_due(2, 0..1);
+        assert!(memory.commit(3, &[1]));
+        SavedRun {
+            length: Nanos::from_millis(1),
+            step: 4,
+            hash: TraceHash(7),
+            clients: vec![(plc, 5), (tank, 9)],
+            memory,
+        }
+    }
+
+    #[test]
+    fn a_file_is_read_as_it_was_written_and_refused_when_any_byte_is_another_one() {
+        let run = saved();
+        let bytes = run.to_bytes();
+        assert_eq!(SavedRun::parse(&bytes), Ok(run));
+        for at in 0..bytes.len() {
+            let cut = SavedRun::parse(&bytes[..at]).expect_err("it is cut");
+            assert_eq!(cut, (at, "the file is cut".to_owned()));
+            let mut damaged = bytes.clone();
+            damaged[at] ^= 0x10;
+            SavedRun::parse(&damaged).expect_err("a byte is another one");
+        }
+        let longer = [&*bytes, &[0]].concat();
+        let (at, what) = SavedRun::parse(&longer).expect_err("it is longer");
+        assert_eq!(
+            (at, &*what),
+            (bytes.len(), "the file is longer than it says")
+        );
+    }
+
+    #[test]
+    fn a_file_replaces_an_older_one_as_a_whole_and_says_what_is_wrong_with_it() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("cell.saved");
+        let run = saved();
+        for _ in 0..2 {
+            run.save(&path).expect("it can be written");
+            assert_eq!(SavedRun::load(&path).expect("it is right"), run);
+        }
+        assert_eq!(fs::read_dir(folder.path()).expect("a folder").count(), 1);
+        fs::write(&path, "[sync]\n").expect("it can be written");
+        let told = SavedRun::load(&path).expect_err("another file").to_string();
+        assert!(told.contains("byte 0: this is no saved run"), "{told}");
+        let told = run.save(&folder.path().join("none/cell.saved"));
+        assert_eq!(told.expect_err("no folder").kind(), io::ErrorKind::NotFound);
+    }
+
+    #[test]
+    fn a_memory_without_initial_values_is_refused() {
+        let mut run = saved();
+        run.memory = Memory::default();
+        let (at, what) = SavedRun::parse(&run.to_bytes()).expect_err("nothing to begin with");
+        assert_eq!(at, HEAD);
+        assert!(what.ends_with("it has no initial values"), "{what}");
+    }
+}

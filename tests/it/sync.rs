@@ -5,6 +5,7 @@
 mod diff;
 #[cfg(feature = "page")]
 mod page;
+mod save;
 
 use std::io::{BufRead as _, BufReader, Lines, Write as _};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};

@@ -25,7 +25,7 @@ impl Participant for Miscounter {
     }
 }
 
-fn diff(files: [&std::path::Path; 2]) -> (String, Option<i32>) {
+pub(super) fn diff(files: [&std::path::Path; 2]) -> (String, Option<i32>) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_tickbus"));
     let output = command.args(["sync", "diff"]).args(files).output();
     let output = output.expect("the tickbus program runs");

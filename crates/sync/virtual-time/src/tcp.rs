@@ -3,6 +3,7 @@
 mod client;
 mod connection;
 mod direct;
+mod inbox;
 mod line;
 mod peers;
 mod server;

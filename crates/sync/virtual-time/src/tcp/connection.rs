@@ -1,11 +1,12 @@
 //! The server's end of one connection.
 
-use std::io::{self, Read as _, Write as _};
+use std::io::{self, Write as _};
 
 use tickbus_base::net::{BlockingStream, TcpStream};
 use tickbus_base::time::Nanos;
 use tickbus_net::{IS_BROWSER, begins_like_browser, close_gracefully, prepare};
 
+use super::inbox::{Arrived, Inbox};
 use super::is_later;
 use crate::server::ToClient;
 use crate::wire;
@@ -21,21 +22,9 @@ const BUFFER: usize = 4096;
 #[derive(Debug)]
 pub(super) struct Connection {
     stream: BlockingStream,
-    buffer: Vec<u8>,
-    /// The received bytes that were not taken yet.
-    start: usize,
-    end: usize,
+    inbox: Inbox,
     out: Vec<u8>,
     written: usize,
-}
-
-/// The result of a read.
-#[derive(Debug, PartialEq, Eq)]
-pub(super) enum Arrived {
-    Something,
-    NothingYet,
-    /// The connection is gone, for this reason.
-    Gone(String),
 }
 
 impl Connection {
@@ -44,9 +33,7 @@ impl Connection {
         prepare(stream.os(), patience)?;
         Ok(Self {
             stream: stream.block(BLOCKED, Some(BLOCKED))?,
-            buffer: vec![0; BUFFER],
-            start: 0,
-            end: 0,
+            inbox: Inbox::new(BUFFER),
             out: Vec::with_capacity(BUFFER),
             written: 0,
         })
@@ -59,52 +46,30 @@ impl Connection {
 
     /// Reads once.
     pub(super) fn read(&mut self) -> Arrived {
-        if self.start == self.end {
-            (self.start, self.end) = (0, 0);
-        } else if self.start > 0 {
-            self.buffer.copy_within(self.start..self.end, 0);
-            (self.start, self.end) = (0, self.end - self.start);
-        }
-        if self.end == self.buffer.len() {
-            // Frames have a limit, so this ends; and the peer has to send as many bytes as we allocate.
-            self.buffer.resize(2 * self.end, 0);
-        }
-        match (&self.stream).read(&mut self.buffer[self.end..]) {
-            Ok(0) => Arrived::Gone("it closed the connection".to_owned()),
-            Ok(count) => {
-                self.end += count;
-                Arrived::Something
-            }
-            Err(error) if is_later(&error) => Arrived::NothingYet,
-            Err(error) => Arrived::Gone(error.to_string()),
-        }
+        self.inbox.read(&self.stream)
     }
 
     /// Takes the next complete frame, without its header.
     pub(super) fn frame(&mut self) -> Result<Option<&[u8]>, String> {
-        let arrived = &self.buffer[self.start..self.end];
-        let frame = wire::frame(arrived).map_err(|why| {
-            if begins_like_browser(arrived) {
+        let is_browser = begins_like_browser(self.inbox.arrived());
+        self.inbox.frame().map_err(|why| {
+            if is_browser {
                 IS_BROWSER.to_owned()
             } else {
                 why
             }
-        })?;
-        if let Some(frame) = frame {
-            self.start += wire::HEADER + frame.len();
-        }
-        Ok(frame)
+        })
     }
 
     /// True if the next complete frame holds the values of a step.
     pub(super) fn has_values(&self) -> bool {
-        let next = wire::frame(&self.buffer[self.start..self.end]);
+        let next = wire::frame(self.inbox.arrived());
         matches!(next, Ok(Some(frame)) if wire::is_done(frame))
     }
 
     /// The step of the last complete frame, if that holds values.
     pub(super) fn last_step(&self) -> Option<u64> {
-        let mut left = &self.buffer[self.start..self.end];
+        let mut left = self.inbox.arrived();
         let mut last = None;
         while let Ok(Some(frame)) = wire::frame(left) {
             last = wire::done_step(frame);
@@ -114,8 +79,8 @@ impl Connection {
     }
 
     /// The number of bytes that were received and not taken.
-    pub(super) const fn waiting(&self) -> usize {
-        self.end - self.start
+    pub(super) fn waiting(&self) -> usize {
+        self.inbox.arrived().len()
     }
 
     /// Sends a message, or as much of it as the system accepts.

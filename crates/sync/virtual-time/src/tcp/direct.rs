@@ -7,7 +7,7 @@ use tickbus_base::net::TcpStream;
 use tickbus_base::os::{Interest, PollSet};
 use tickbus_base::time::{Nanos, Stop};
 
-use super::connection::Arrived;
+use super::inbox::Arrived;
 use super::line::{LOOK, TcpLine};
 use super::peers::{Door, Peers};
 use crate::client::Line;

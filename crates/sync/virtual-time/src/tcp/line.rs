@@ -1,12 +1,12 @@
 //! A blocking line to the server.
 
-use std::io::{Read as _, Write as _};
+use std::io::Write as _;
 use std::sync::Arc;
 
 use tickbus_base::net::{BlockingStream, TcpStream};
 use tickbus_base::time::{Clock, Nanos, Stop};
 
-use super::is_later;
+use super::inbox::{Arrived, Inbox};
 use crate::client::{Line, closed, silent};
 use crate::{Cause, Ended, wire};
 
@@ -24,9 +24,7 @@ pub(super) struct TcpLine {
     stop: Stop,
     /// When `receive` gives up in any case.
     leaves: Option<Nanos>,
-    buffer: Vec<u8>,
-    start: usize,
-    end: usize,
+    inbox: Inbox,
 }
 
 impl TcpLine {
@@ -36,9 +34,7 @@ impl TcpLine {
             clock: Arc::clone(clock),
             stop: stop.clone(),
             leaves: None,
-            buffer: vec![0; 4096],
-            start: 0,
-            end: 0,
+            inbox: Inbox::new(4096),
         }
     }
 
@@ -53,7 +49,7 @@ impl TcpLine {
 
     /// True if a frame has arrived that was not received yet.
     pub(super) fn has_frame(&self) -> bool {
-        let arrived = wire::frame(&self.buffer[self.start..self.end]);
+        let arrived = wire::frame(self.inbox.arrived());
         !matches!(arrived, Ok(None))
     }
 
@@ -83,34 +79,25 @@ impl Line for TcpLine {
     fn receive(&mut self, limit: Nanos) -> Result<&[u8], Ended> {
         // Read the clock only when there is time for that.
         let mut begun = None;
+        let violated = |what| {
+            let reason = format!("the server violates the protocol: it {what}");
+            Ended::before(Cause::Protocol, reason)
+        };
         loop {
-            let arrived = wire::frame_length(&self.buffer[self.start..self.end]);
-            let violated = |what| {
-                let reason = format!("the server violates the protocol: it {what}");
-                Ended::before(Cause::Protocol, reason)
-            };
-            if let Some(length) = arrived.map_err(violated)?
-                && length <= self.end - self.start
-            {
-                let frame = self.start + wire::HEADER..self.start + length;
-                self.start = frame.end;
-                return Ok(&self.buffer[frame]);
+            let arrived = wire::frame(self.inbox.arrived());
+            if arrived.map_err(violated)?.is_some() {
+                let frame = self.inbox.frame().map_err(violated)?;
+                return Ok(frame.expect("it has arrived"));
             }
-            self.buffer.copy_within(self.start..self.end, 0);
-            (self.start, self.end) = (0, self.end - self.start);
-            if self.end == self.buffer.len() {
-                self.buffer.resize(2 * self.end, 0);
-            }
-            match (&self.stream).read(&mut self.buffer[self.end..]) {
-                Ok(0) => return Err(lost("it closed the connection")),
-                Ok(count) => self.end += count,
-                Err(error) if is_later(&error) => {
+            match self.inbox.read(&self.stream) {
+                Arrived::Something => {}
+                Arrived::NothingYet => {
                     let begun = *begun.get_or_insert_with(|| self.clock.now());
                     if let Some(ended) = self.impatient(begun, limit) {
                         return Err(ended);
                     }
                 }
-                Err(error) => return Err(lost(error)),
+                Arrived::Gone(reason) => return Err(lost(reason)),
             }
         }
     }

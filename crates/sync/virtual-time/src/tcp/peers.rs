@@ -1,6 +1,6 @@
 //! The connections of a client with the other clients of its run.
 
-use std::io::{self, ErrorKind, Read as _, Write as _};
+use std::io::{self, ErrorKind, Write as _};
 use std::net::SocketAddr;
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -11,7 +11,7 @@ use tickbus_base::os::{Interest, PollSet};
 use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_net::{Address, Host, LocalAddress, bind, prepare, reach};
 
-use super::connection::Arrived;
+use super::inbox::{Arrived, Inbox};
 use super::is_later;
 use super::line::{LOOK, PATIENCE};
 use crate::{MemberList, wire};
@@ -66,10 +66,7 @@ pub(super) struct Peers(Vec<Option<Peer>>);
 #[derive(Debug)]
 struct Peer {
     stream: BlockingStream,
-    buffer: Vec<u8>,
-    /// The received bytes that were not taken yet.
-    start: usize,
-    end: usize,
+    inbox: Inbox,
 }
 
 impl Peers {
@@ -137,11 +134,7 @@ impl Peers {
     /// Takes the next complete frame of the client at this place, without its header.
     pub(super) fn frame(&mut self, at: usize) -> Result<Option<&[u8]>, String> {
         let peer = self.0[at].as_mut().expect("it was reached");
-        let frame = wire::frame(&peer.buffer[peer.start..peer.end])?;
-        if let Some(frame) = frame {
-            peer.start += wire::HEADER + frame.len();
-        }
-        Ok(frame)
+        peer.inbox.frame()
     }
 
     /// Reads once, and blocks for a moment if nothing has come.
@@ -167,19 +160,15 @@ impl Peer {
         prepare(stream.os(), PATIENCE)?;
         Ok(Self {
             stream: stream.block(LOOK, Some(LOOK))?,
-            buffer: vec![0; BUFFER],
-            start: 0,
-            end: 0,
+            inbox: Inbox::new(BUFFER),
         })
     }
 
     /// Waits for the greeting of a client that has connected; its place in the list.
     fn greeting(&mut self, list: &MemberList, clock: &dyn Clock, until: Nanos) -> Option<usize> {
         loop {
-            let frame = wire::frame(&self.buffer[..self.end]).ok()?;
-            if let Some(frame) = frame {
+            if let Some(frame) = self.inbox.frame().ok()? {
                 let (token, at) = wire::read_hello(frame).ok()?;
-                self.start = wire::HEADER + frame.len();
                 return (token == list.token && at < list.members.len()).then_some(at);
             }
             let read = self.read();
@@ -191,21 +180,7 @@ impl Peer {
     }
 
     fn read(&mut self) -> Arrived {
-        self.buffer.copy_within(self.start..self.end, 0);
-        (self.start, self.end) = (0, self.end - self.start);
-        if self.end == self.buffer.len() {
-            // Frames have a limit, and so has the buffer: nothing is read while a frame waits.
-            self.buffer.resize(2 * self.end, 0);
-        }
-        match (&self.stream).read(&mut self.buffer[self.end..]) {
-            Ok(0) => Arrived::Gone("it closed the connection".to_owned()),
-            Ok(count) => {
-                self.end += count;
-                Arrived::Something
-            }
-            Err(error) if is_later(&error) => Arrived::NothingYet,
-            Err(error) => Arrived::Gone(error.to_string()),
-        }
+        self.inbox.read(&self.stream)
     }
 }
 

@@ -10,7 +10,8 @@ use tickbus_base::os::{Interest, PollSet};
 use tickbus_base::time::{Nanos, Simulation};
 use tickbus_net::{Acceptor, Address, LocalAddress, bind};
 
-use super::connection::{Arrived, BLOCKED, Connection};
+use super::connection::{BLOCKED, Connection};
+use super::inbox::Arrived;
 use crate::hosting::{Hosting, hear, keep};
 use crate::local::Locals;
 use crate::server::ToClient;

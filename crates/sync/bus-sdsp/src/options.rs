@@ -80,7 +80,7 @@ pub struct Options {
 pub enum Every {
     /// This many steps of the server.
     Steps(NonZeroU32),
-    /// This virtual time: a whole multiple of the server's step, and above zero.
+    /// This virtual time: at least the server's step.
     Time(Nanos),
     /// The ticks of the simulation: each is a step, the first of the server's at or after its time.
     Tick,

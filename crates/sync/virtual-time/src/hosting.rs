@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use tickbus_base::time::{Clock, Nanos, Stop};
 
+use crate::saved_run;
 use crate::server::{Control, Server};
 use crate::view::RunView;
 use crate::wire::{self, FromClient};
@@ -110,13 +111,9 @@ pub(crate) fn keep(server: &mut Server<'_>, hosting: &mut Hosting<'_>) {
     let Some(saved) = server.take_saved() else {
         return;
     };
-    let written = saved.and_then(|saved| match server.saved_to() {
-        Some(file) => match saved.save(file) {
-            Ok(()) => Ok(format!(
-                "saved after step {} in {}",
-                saved.steps(),
-                file.display()
-            )),
+    let written = saved.and_then(|(step, content)| match server.saved_to() {
+        Some(file) => match saved_run::write(file, &content) {
+            Ok(()) => Ok(format!("saved after step {} in {}", step, file.display())),
             Err(error) => Err(format!("{}: {error}", file.display())),
         },
         None => Err("there is no file for it".to_owned()),

@@ -5,7 +5,7 @@ use tickbus_base::time::{Clock as _, Monotonic, Stop};
 use crate::local::Locals;
 use crate::logic::Logic;
 use crate::server::Server;
-use crate::{Cause, Ended, Outcome, Pacing, Participant, Settings};
+use crate::{Cause, Ended, Outcome, Pacing, Participant, Settings, saved_run};
 
 /// Runs these participants, one after another in each step, until the run ends.
 ///
@@ -36,8 +36,8 @@ pub fn run(
         while let Some((seat, message)) = server.poll() {
             locals.take(seat, &message);
         }
-        if let (Some(Ok(saved)), Some(file)) = (server.take_saved(), server.saved_to())
-            && let Err(error) = saved.save(file)
+        if let (Some(Ok((_, content))), Some(file)) = (server.take_saved(), server.saved_to())
+            && let Err(error) = saved_run::write(file, &content)
         {
             let reason = format!("the run was not saved: {}: {error}", file.display());
             return Err(Ended::before(Cause::System, reason));

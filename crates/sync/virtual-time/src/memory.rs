@@ -4,8 +4,11 @@ use std::ops::Range;
 
 use crate::bytes::Reader;
 
-/// The most bytes that are kept; a longer run continues, but no member of it can come back, and it cannot be saved.
+/// The most bytes that are kept for members that come back; in a longer run none can.
 pub(crate) const MOST: usize = if cfg!(test) { 2000 } else { 64 << 20 };
+
+/// The most bytes that are kept for a run that is to be saved.
+pub(crate) const MOST_SAVED: usize = if cfg!(test) { 4000 } else { 256 << 20 };
 
 /// The bits of a word.
 const BITS: usize = u64::BITS as usize;
@@ -45,8 +48,8 @@ impl Memory {
         }
     }
 
-    /// Completes the commit; false if there is no room for it.
-    pub(crate) fn commit(&mut self, sequence: u64, values: &[u64]) -> bool {
+    /// Completes the commit.
+    pub(crate) fn commit(&mut self, sequence: u64, values: &[u64]) {
         self.last.resize(values.len(), 0);
         let before = self.changed.len();
         for (at, (value, last)) in values.iter().zip(&mut self.last).enumerate() {
@@ -60,13 +63,13 @@ impl Memory {
         let from = self.due.len() - self.words;
         if before == self.changed.len() && self.due[from..].iter().all(|word| *word == 0) {
             self.due.truncate(from);
-            return true;
+            return;
         }
         self.commits.push((sequence, self.changed.len()));
-        self.bytes() <= MOST
     }
 
-    fn bytes(&self) -> usize {
+    /// The size in bytes.
+    pub(crate) fn bytes(&self) -> usize {
         16 * self.commits.len() + 4 * self.changed.len() + 8 * (self.values.len() + self.due.len())
     }
 

@@ -33,7 +33,7 @@ const HEAD: usize = 20;
 const TAIL: usize = 8;
 
 /// The largest file: the memory of a run, and the names of its clients and variables.
-const LARGEST: u64 = 2 * memory::MOST as u64 + (64 << 20);
+const LARGEST: u64 = 2 * memory::MOST_SAVED as u64 + (64 << 20);
 
 /// A run that was saved at a step.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -106,48 +106,10 @@ impl SavedRun {
         })
     }
 
-    /// Writes the file at `path`: first beside it, so that an older file stays until this one is complete.
-    ///
-    /// # Errors
-    ///
-    /// The file cannot be written.
-    pub fn save(&self, path: &Path) -> io::Result<()> {
-        let mut part = path.as_os_str().to_owned();
-        part.push(".part");
-        let part = PathBuf::from(part);
-        let written = (|| {
-            let mut file = File::create(&part)?;
-            file.write_all(&self.to_bytes())?;
-            file.sync_all()?;
-            drop(file);
-            fs::rename(&part, path)
-        })();
-        if written.is_err() {
-            let _ = fs::remove_file(&part);
-        }
-        written
-    }
-
     /// The content of the file.
     pub fn to_bytes(&self) -> Vec<u8> {
-        let mut out = Vec::new();
-        out.extend_from_slice(&MAGIC);
-        out.extend_from_slice(&VERSION.to_le_bytes());
-        out.extend_from_slice(&[0; 8]);
-        out.extend_from_slice(&self.length.0.to_le_bytes());
-        out.extend_from_slice(&self.step.to_le_bytes());
-        out.extend_from_slice(&self.hash.0.to_le_bytes());
-        count(&mut out, self.clients.len());
-        for (declaration, next) in &self.clients {
-            declared(&mut out, declaration);
-            out.extend_from_slice(&next.to_le_bytes());
-        }
-        self.memory.write(&mut out);
-        let content = (out.len() - HEAD) as u64;
-        out[HEAD - 8..HEAD].copy_from_slice(&content.to_le_bytes());
-        let sum = sum(&out);
-        out.extend_from_slice(&sum.to_le_bytes());
-        out
+        let clients = self.clients.iter().map(|(client, next)| (client, *next));
+        to_bytes((self.length, self.step, self.hash), clients, &self.memory)
     }
 
     /// Reads the content of a file.
@@ -224,6 +186,51 @@ impl SavedRun {
     }
 }
 
+/// The content of the file of a run with steps of this length, after this step and with this trace hash: its clients in
+/// the order of their names, each with the step in which it runs next, and all commits.
+pub(crate) fn to_bytes<'c>(
+    (length, step, hash): (Nanos, u64, TraceHash),
+    clients: impl ExactSizeIterator<Item = (&'c Declaration, u64)>,
+    memory: &Memory,
+) -> Vec<u8> {
+    let mut out = Vec::new();
+    out.extend_from_slice(&MAGIC);
+    out.extend_from_slice(&VERSION.to_le_bytes());
+    out.extend_from_slice(&[0; 8]);
+    out.extend_from_slice(&length.0.to_le_bytes());
+    out.extend_from_slice(&step.to_le_bytes());
+    out.extend_from_slice(&hash.0.to_le_bytes());
+    count(&mut out, clients.len());
+    for (declaration, next) in clients {
+        declared(&mut out, declaration);
+        out.extend_from_slice(&next.to_le_bytes());
+    }
+    memory.write(&mut out);
+    let content = (out.len() - HEAD) as u64;
+    out[HEAD - 8..HEAD].copy_from_slice(&content.to_le_bytes());
+    let sum = sum(&out);
+    out.extend_from_slice(&sum.to_le_bytes());
+    out
+}
+
+/// Writes the file at `path`: first beside it, so that an older file stays until this one is complete.
+pub(crate) fn write(path: &Path, content: &[u8]) -> io::Result<()> {
+    let mut part = path.as_os_str().to_owned();
+    part.push(".part");
+    let part = PathBuf::from(part);
+    let written = (|| {
+        let mut file = File::create(&part)?;
+        file.write_all(content)?;
+        file.sync_all()?;
+        drop(file);
+        fs::rename(&part, path)
+    })();
+    if written.is_err() {
+        let _ = fs::remove_file(&part);
+    }
+    written
+}
+
 fn read(path: &Path) -> io::Result<Vec<u8>> {
     let file = File::open(path)?;
     let mut bytes = Vec::new();
@@ -254,9 +261,9 @@ mod tests {
         tank.reads.push("go".to_owned());
         let mut memory = Memory::default();
         memory.note_due(2, 0..2);
-        assert!(memory.commit(0, &[0]));
+        memory.commit(0, &[0]);
         memory.note_due(2, 0..1);
-        assert!(memory.commit(3, &[1]));
+        memory.commit(3, &[1]);
         SavedRun {
             length: Nanos::from_millis(1),
             step: 4,
@@ -292,14 +299,14 @@ mod tests {
         let path = folder.path().join("cell.saved");
         let run = saved();
         for _ in 0..2 {
-            run.save(&path).expect("it can be written");
+            write(&path, &run.to_bytes()).expect("it can be written");
             assert_eq!(SavedRun::load(&path).expect("it is right"), run);
         }
         assert_eq!(fs::read_dir(folder.path()).expect("a folder").count(), 1);
         fs::write(&path, "[sync]\n").expect("it can be written");
         let told = SavedRun::load(&path).expect_err("another file").to_string();
         assert!(told.contains("byte 0: this is no saved run"), "{told}");
-        let told = run.save(&folder.path().join("none/cell.saved"));
+        let told = write(&folder.path().join("none/cell.saved"), &run.to_bytes());
         assert_eq!(told.expect_err("no folder").kind(), io::ErrorKind::NotFound);
     }
 

@@ -6,7 +6,7 @@ use tickbus_base::toml_text::printable;
 
 use super::{Out, Phase, Seat, Server, ToClient};
 use crate::barrier::State;
-use crate::memory::{MOST, Memory, Place};
+use crate::memory::{MOST, MOST_SAVED, Memory, Place};
 use crate::step::step_of;
 use crate::{Cause, Declaration, Settings};
 
@@ -145,8 +145,10 @@ impl Server<'_> {
             return;
         };
         let step = barrier.step().sequence;
+        memory.commit(step, barrier.committed());
+        let most = if rejoining.saves { MOST_SAVED } else { MOST };
         // Whoever is missing already is still waited for.
-        if !memory.commit(step, barrier.committed()) && rejoining.away.is_empty() {
+        if memory.bytes() > most && rejoining.away.is_empty() {
             rejoining.memory = None;
             let what = match (rejoining.limit, rejoining.saves) {
                 (None, _) => "the run cannot be saved",
@@ -155,7 +157,7 @@ impl Server<'_> {
             };
             self.news.push_back(format!(
                 "after step {step} {what}: the memory of the run is full ({} MiB)",
-                MOST >> 20
+                most >> 20
             ));
         }
     }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::{Phase, Server};
 use crate::barrier::State;
-use crate::{SavedRun, Settings};
+use crate::{Settings, saved_run};
 
 /// The requests to save the run, and the result for the host.
 #[derive(Debug)]
@@ -12,8 +12,11 @@ pub(super) struct Saving {
     is_asked: bool,
     /// The step after which the run is to be saved, until that is done.
     at: Option<u64>,
-    saved: Option<Result<SavedRun, String>>,
+    saved: Option<Saved>,
 }
+
+/// The step after which a run was saved, and the content of its file; or why it was not saved.
+pub(crate) type Saved = Result<(u64, Vec<u8>), String>;
 
 impl Saving {
     pub(super) fn new(settings: &Settings) -> Self {
@@ -26,8 +29,8 @@ impl Saving {
 }
 
 impl Server<'_> {
-    /// The run that was just saved, for the file of [`Settings::save`], or why it was not.
-    pub fn take_saved(&mut self) -> Option<Result<SavedRun, String>> {
+    /// The run that was just saved, for the file of [`Settings::save`].
+    pub(crate) fn take_saved(&mut self) -> Option<Saved> {
         self.saving.saved.take()
     }
 
@@ -68,14 +71,9 @@ impl Server<'_> {
         saving.saved = Some(match &self.rejoining.memory {
             Some(memory) => {
                 let clients = 0..barrier.members().clients.len();
-                let client = |at| (barrier.declaration(at).clone(), barrier.next_update(at));
-                Ok(SavedRun {
-                    length: self.settings.step,
-                    step,
-                    hash: barrier.outcome().hash,
-                    clients: clients.map(client).collect(),
-                    memory: memory.clone(),
-                })
+                let client = |at| (barrier.declaration(at), barrier.next_update(at));
+                let run = (self.settings.step, step, barrier.outcome().hash);
+                Ok((step, saved_run::to_bytes(run, clients.map(client), memory)))
             }
             None => Err(format!(
                 "after step {step} the run is longer than the server can keep"

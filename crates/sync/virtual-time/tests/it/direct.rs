@@ -14,14 +14,14 @@ use tickbus_virtual_time::{
     Participant, Settings, Step, in_process, tcp, wire,
 };
 
-type Ends = Vec<Result<Outcome, Ended>>;
+pub(crate) type Ends = Vec<Result<Outcome, Ended>>;
 
 /// The news of a run whose clients exchange their values.
-const DIRECTLY: &str = "the clients exchange their values directly";
+pub(crate) const DIRECTLY: &str = "the clients exchange their values directly";
 
 /// A run with a thread for each client, at a Unix socket or over TCP: the server's result, those of the clients, and the
 /// news.
-fn run<'c>(
+pub(crate) fn run<'c>(
     settings: Settings,
     logic: Logic<'_>,
     controls: &Controls,
@@ -67,19 +67,21 @@ fn run<'c>(
     (outcome, ends, news.into_inner().expect("no panic"))
 }
 
-fn boxed<'c, P: Participant + Send + 'c>(clients: Vec<P>) -> Vec<Box<dyn Participant + Send + 'c>> {
+pub(crate) fn boxed<'c, P: Participant + Send + 'c>(
+    clients: Vec<P>,
+) -> Vec<Box<dyn Participant + Send + 'c>> {
     let boxed = |client| Box::new(client) as Box<dyn Participant + Send + 'c>;
     clients.into_iter().map(boxed).collect()
 }
 
-fn direct(settings: Settings) -> Settings {
+pub(crate) fn direct(settings: Settings) -> Settings {
     Settings {
         exchange: Exchange::Direct,
         ..settings
     }
 }
 
-fn in_this_process(steps: u64, count: u32) -> Outcome {
+pub(crate) fn in_this_process(steps: u64, count: u32) -> Outcome {
     let mut mixers = mixers(count);
     let clients = mixers.iter_mut().map(|mixer| mixer as _).collect();
     in_process::run(mixer_settings(steps, count), clients, Logic::new()).expect("it runs")

@@ -4,6 +4,7 @@ mod common;
 mod direct;
 mod example;
 mod model_check;
+mod neighbours;
 mod next_update;
 mod recording;
 mod rejoin;

@@ -9,8 +9,8 @@ import java.util.List;
  * @param name the client's name, which no other client has: 1 to 255 bytes in UTF-8. The order of the names is the order of
  * the clients
  * @param multiple the number of server steps per step of this client, from 1
- * @param intervalNanos the virtual time of one step of this client in nanoseconds, from which the server makes the multiple;
- * 0 if the multiple counts
+ * @param intervalNanos the virtual time of one step of this client in nanoseconds, at least one step of the server; 0 if the
+ * multiple counts
  * @param writes the variables that the client writes, at most 65535; no other client writes them
  * @param reads the names of the variables that the client reads, at most 65535; its own are allowed
  */
@@ -61,7 +61,8 @@ public record Declaration(String name, int multiple, long intervalNanos, List<Va
      * A declaration with a step in virtual time, whatever the server's step is.
      *
      * @param name the client's name
-     * @param step the virtual time of one step, which must be a whole multiple of the server's
+     * @param step the virtual time of one step, at least one step of the server; the client runs in the first step at or after
+     * each multiple of it
      * @param writes the variables that the client writes
      * @param reads the names of the variables that the client reads
      * @return the declaration

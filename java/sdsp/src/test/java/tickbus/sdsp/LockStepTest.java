@@ -29,8 +29,9 @@ class LockStepTest {
     @TempDir
     Path folder;
 
-    private Sync robot() throws IOException {
-        return new Sync(folder, Files.readString(Path.of(System.getProperty("tickbus.root"), "examples", "robot", "robot.toml")));
+    private Sync robot(String... arguments) throws IOException {
+        Path run = Path.of(System.getProperty("tickbus.root"), "examples", "robot", "robot.toml");
+        return new Sync(folder, Files.readString(run), arguments);
     }
 
     @Test
@@ -66,6 +67,24 @@ class LockStepTest {
             assertEquals(HASH, sync.join(new RobotProgram()).join().hashText());
             assertEquals(HASH, plant.join().hashText());
             assertTrue(sync.await("sync: ok ").endsWith("hash=" + HASH));
+        }
+    }
+
+    @Test
+    void aRunThatWasSavedContinuesWithTheSameTraceHash() throws IOException {
+        String saved = folder.resolve("robot.saved").toString();
+        try (Sync sync = robot("--save-to", saved, "--save-at", "3000")) {
+            CompletableFuture<Outcome> plant = sync.join(new RobotPlant());
+            sync.join(new RobotProgram());
+            assertEquals("sync: saved after step 3000 in " + saved, sync.await("sync: saved "));
+            assertEquals(HASH, plant.join().hashText());
+        }
+        try (Sync sync = robot("--restore", saved)) {
+            CompletableFuture<Outcome> plant = sync.join(new RobotPlant());
+            CompletableFuture<Outcome> plc = sync.join(new RobotProgram());
+            sync.await("sync: all have joined: the clients run the steps up to 3000 again");
+            assertEquals(HASH, plant.join().hashText());
+            assertEquals(HASH, plc.join().hashText());
         }
     }
 

@@ -8,6 +8,8 @@ import java.net.SocketAddress;
 import java.net.UnixDomainSocketAddress;
 import java.nio.file.Files;
 import java.nio.file.Path;
+import java.util.ArrayList;
+import java.util.List;
 import java.util.concurrent.CompletableFuture;
 import java.util.concurrent.CompletionException;
 
@@ -17,12 +19,17 @@ final class Sync implements AutoCloseable {
     private final BufferedReader out;
     private final SocketAddress address;
 
-    /** Starts the command in a folder, with the text of its file; there it listens on port 20060, or at a Unix socket. */
-    Sync(Path folder, String run) throws IOException {
+    /**
+     * Starts the command in a folder, with the text of its file and further arguments; there it listens on port 20060, or at
+     * a Unix socket.
+     */
+    Sync(Path folder, String run, String... arguments) throws IOException {
         Path file = Files.writeString(folder.resolve("run.toml"), run.replace(":20060", ":0"));
         String command = File.separatorChar == '\\' ? "tickbus.exe" : "tickbus";
-        process = new ProcessBuilder(Path.of(System.getProperty("tickbus.native.dir"), command).toString(), "sync",
-            file.toString()).redirectError(ProcessBuilder.Redirect.INHERIT).start();
+        List<String> words = new ArrayList<>(List.of(
+            Path.of(System.getProperty("tickbus.native.dir"), command).toString(), "sync", file.toString()));
+        words.addAll(List.of(arguments));
+        process = new ProcessBuilder(words).redirectError(ProcessBuilder.Redirect.INHERIT).start();
         out = process.inputReader();
         String line = await("sync: listening on ");
         int unix = line.indexOf("unix:");

@@ -311,6 +311,32 @@ mod tests {
     }
 
     #[test]
+    fn any_content_with_a_right_checksum_is_refused_or_can_be_run_again() {
+        let bytes = saved().to_bytes();
+        let mut right = 0;
+        for at in HEAD..bytes.len() - TAIL {
+            for bit in 0..8 {
+                let mut other = bytes.clone();
+                other[at] ^= 1 << bit;
+                let end = other.len() - TAIL;
+                let sum = sum(&other[..end]);
+                other[end..].copy_from_slice(&sum.to_le_bytes());
+                let Ok(run) = SavedRun::parse(&other) else {
+                    continue;
+                };
+                right += 1;
+                for client in 0..run.clients.len() {
+                    let mut place = run.memory.start();
+                    while run.memory.next(&mut place, client).is_some() {
+                        run.memory.pass(&mut place);
+                    }
+                }
+            }
+        }
+        assert!(right > 100, "{right}");
+    }
+
+    #[test]
     fn a_memory_without_initial_values_is_refused() {
         let mut run = saved();
         run.memory = Memory::default();

@@ -3,6 +3,7 @@
 mod direct;
 mod joining;
 mod message;
+mod outbox;
 mod patience;
 mod rejoining;
 mod saving;
@@ -22,6 +23,7 @@ use direct::{Allowed, Meeting};
 use joining::Joining;
 pub(crate) use joining::MOST_CLIENTS;
 pub use message::{Control, ToClient};
+use outbox::Out;
 use rejoining::Rejoining;
 use saving::Saving;
 
@@ -89,18 +91,6 @@ enum Seat {
     Back(usize),
     /// The next message is the end.
     Leaving,
-}
-
-#[derive(Debug)]
-enum Out {
-    Start(usize),
-    Step(usize),
-    Waiting(usize),
-    Meet(usize),
-    Members(usize, usize),
-    Until(usize),
-    End(usize),
-    Refused(usize, Box<Ended>),
 }
 
 impl<'l> Server<'l> {
@@ -408,48 +398,6 @@ impl<'l> Server<'l> {
         self.rejoining.have_begun(now);
     }
 
-    /// The next message, and the seat of its receiver.
-    pub fn poll(&mut self) -> Option<(usize, ToClient<'_>)> {
-        let out = self.outbox.pop_front()?;
-        let seat = out.seat();
-        let message = match (out, &self.phase, self.seats[seat]) {
-            (Out::Step(_), Phase::Running(barrier, _), Seat::Client(client)) => ToClient::Step {
-                step: barrier.step(),
-                reads: barrier.snapshot(client),
-            },
-            (Out::Step(_), Phase::Running(..), Seat::Back(_)) => {
-                self.replayed(seat).expect("it is asked again")
-            }
-            (
-                Out::Start(_),
-                Phase::Running(barrier, _),
-                Seat::Client(client) | Seat::Back(client),
-            ) => ToClient::Start {
-                step: self.settings.step,
-                reads: barrier.read_types(client),
-            },
-            (Out::Waiting(_), ..) => ToClient::Waiting(&self.waits_for),
-            (Out::Meet(_), ..) => ToClient::Meet(self.token()),
-            (Out::Members(_, own), ..) => match &self.meeting {
-                Some(meeting) => ToClient::Members(own, &meeting.list),
-                // The client of another seat has left in the meantime; a new token makes this one forget the meeting.
-                None => ToClient::Meet(0),
-            },
-            (Out::Until(_), ..) => ToClient::Until(self.allowed.as_ref().map_or(0, Allowed::until)),
-            (Out::Refused(_, ended), ..) => {
-                self.seats[seat] = Seat::Free;
-                self.refused = Err(*ended);
-                ToClient::End(&self.refused)
-            }
-            (Out::End(_), Phase::Ended(outcome), _) => {
-                self.seats[seat] = Seat::Free;
-                ToClient::End(outcome)
-            }
-            (out, ..) => unreachable!("{out:?} does not outlive its phase"),
-        };
-        Some((seat, message))
-    }
-
     fn blame(&mut self, seat: usize, cause: Cause, reason: &str) {
         let client = self.name(seat).map(str::to_owned);
         self.end_for(cause, client, reason.to_owned());
@@ -503,20 +451,5 @@ impl<'l> Server<'l> {
             ..Ended::before(Cause::Refused, reason)
         };
         self.outbox.push_back(Out::Refused(seat, Box::new(ended)));
-    }
-}
-
-impl Out {
-    const fn seat(&self) -> usize {
-        match self {
-            Self::Start(seat)
-            | Self::Step(seat)
-            | Self::Waiting(seat)
-            | Self::Meet(seat)
-            | Self::Members(seat, _)
-            | Self::Until(seat)
-            | Self::End(seat)
-            | Self::Refused(seat, _) => *seat,
-        }
     }
 }

@@ -11,6 +11,7 @@ use tickbus_image::signal::DataType;
 use crate::hash::Trace;
 use crate::logic::{Access, Commit, Hook, Logic};
 use crate::members::{Client, Members};
+use crate::memory::Memory;
 use crate::saved_run::SavedRun;
 use crate::shared_data::SharedData;
 use crate::step::step_of;
@@ -188,6 +189,11 @@ impl<'l> Barrier<'l> {
         }
     }
 
+    /// The trace so far.
+    pub(crate) const fn trace(&self) -> &Trace {
+        &self.trace
+    }
+
     /// The number of the last step for which virtual time has room.
     pub(crate) const fn last_step(&self) -> u64 {
         (i64::MAX / self.length.0).unsigned_abs() + 1
@@ -335,9 +341,34 @@ impl<'l> Barrier<'l> {
 
     /// Continues a saved run of the same clients: makes all its commits, and shows them to those who read each of them.
     pub(crate) fn restore(&mut self, saved: &SavedRun) -> Result<(), String> {
-        let memory = &saved.memory;
+        if let Some(memory) = &saved.memory {
+            self.make_all(memory, saved.step)?;
+        } else {
+            self.data.replace(&saved.values);
+            self.step = step_of(saved.step, self.length);
+            self.trace = saved.trace.clone();
+            self.show_commit()?;
+        }
+        if self.trace.hash() != saved.hash() {
+            return Err(format!(
+                "the saved run has the trace hash {}, and its values have {}; it was not saved by this tickbus",
+                saved.hash(),
+                self.trace.hash()
+            ));
+        }
+        self.owing = 0;
+        for (member, client) in self.members.iter_mut().zip(&saved.clients) {
+            member.owes = false;
+            member.next_update = client.next;
+        }
+        self.choose_due();
+        Ok(())
+    }
+
+    /// Makes all commits of a memory, up to the step `last`.
+    fn make_all(&mut self, memory: &Memory, last: u64) -> Result<(), String> {
         let mut place = memory.start();
-        for sequence in 0..=saved.step {
+        for sequence in 0..=last {
             if memory.number(&place) == Some(sequence) {
                 memory.pass(&mut place);
                 self.data.replace(place.values());
@@ -346,19 +377,6 @@ impl<'l> Barrier<'l> {
             self.trace.commit(self.step, self.data.committed());
             self.show_commit()?;
         }
-        if self.trace.hash() != saved.hash {
-            return Err(format!(
-                "the saved run has the trace hash {}, and its values have {}; it was not saved by this tickbus",
-                saved.hash,
-                self.trace.hash()
-            ));
-        }
-        self.owing = 0;
-        for (member, (_, next)) in self.members.iter_mut().zip(&saved.clients) {
-            member.owes = false;
-            member.next_update = *next;
-        }
-        self.choose_due();
         Ok(())
     }
 

@@ -157,6 +157,13 @@ impl<'a> Reader<'a> {
         Ok(Slots(taken.as_chunks().0))
     }
 
+    /// `count` bytes.
+    pub(crate) fn bytes(&mut self, count: usize) -> Result<&'a [u8], String> {
+        let (taken, rest) = self.0.split_at_checked(count).ok_or_else(too_short)?;
+        self.0 = rest;
+        Ok(taken)
+    }
+
     /// Slots up to the end.
     pub(crate) fn slots(&mut self) -> Result<Slots<'a>, String> {
         let (slots, rest) = self.0.as_chunks();
@@ -165,6 +172,11 @@ impl<'a> Reader<'a> {
         }
         self.0 = &[];
         Ok(Slots(slots))
+    }
+
+    /// Everything up to the end.
+    pub(crate) fn rest(&mut self) -> &'a [u8] {
+        std::mem::take(&mut self.0)
     }
 
     pub(crate) fn rest_as_text(&mut self) -> Result<&'a str, String> {

@@ -33,7 +33,18 @@ pub struct Client {
     read_types: Vec<DataType>,
     reads: Vec<u64>,
     waits_for: String,
+    /// What the server wants to do with the state.
+    state: Option<Stated>,
     out: Vec<u8>,
+}
+
+/// A request about the state of a client.
+#[derive(Debug)]
+enum Stated {
+    /// Save it as it is after this step.
+    Save(u64),
+    /// Restore it.
+    Restore { writes: Vec<u64>, state: Vec<u8> },
 }
 
 impl Client {
@@ -55,6 +66,7 @@ impl Client {
             step: Nanos::ZERO,
             read_types: Vec::new(),
             waits_for: String::new(),
+            state: None,
             out,
         })
     }
@@ -122,6 +134,10 @@ impl Client {
             // The line of the client deals with these, if it can.
             return Err(violated("lets clients meet that cannot".to_owned()));
         }
+        if let FromServer::Save(sequence) = message {
+            self.state = Some(Stated::Save(sequence));
+            return Ok(None);
+        }
         if let Some(owed) = self.owes {
             return Err(violated(format!("went on before step {owed} was answered")));
         }
@@ -158,6 +174,22 @@ impl Client {
                 self.owes = Some(step.sequence);
                 Ok(Some(Asked::Step(step)))
             }
+            FromServer::Restore {
+                sequence,
+                writes,
+                state,
+            } => {
+                let expected = self.declaration.writes.len();
+                if self.ran != Some(0) || writes.iter().len() != expected {
+                    return Err(violated("restores another state".to_owned()));
+                }
+                self.owes = Some(sequence);
+                self.state = Some(Stated::Restore {
+                    writes: writes.iter().collect(),
+                    state: state.to_vec(),
+                });
+                Ok(None)
+            }
             _ => unreachable!("dealt with above"),
         }
     }
@@ -186,6 +218,20 @@ impl Client {
         wire::done(&mut self.out, sequence, next, writes);
     }
 
+    /// Makes the frame with the state after the step `sequence`, or why there is none.
+    fn saved(&mut self, sequence: u64, state: Result<Vec<u8>, String>) {
+        let state = state.and_then(|state| match state.len() {
+            0..=wire::LONGEST_STATE => Ok(state),
+            long => Err(format!(
+                "its state has {long} bytes, {} at most",
+                wire::LONGEST_STATE
+            )),
+        });
+        self.out.clear();
+        let state = state.as_deref().map_err(|reason| &**reason);
+        wire::saved(&mut self.out, sequence, state);
+    }
+
     /// Makes the frame that says why the client gives up.
     pub fn give_up(&mut self, reason: &str) {
         self.out.clear();
@@ -203,6 +249,16 @@ pub(crate) trait Line: fmt::Debug + Send {
 
     /// From now on, `receive` gives up after `limit` in all, even if the server says that it waits for others.
     fn leave_within(&mut self, limit: Nanos);
+}
+
+/// The answer of a client that cannot save its state.
+const NO_STATE: &str = "it has no way to save its state";
+
+/// A frame of the server.
+enum Heard {
+    Asked(Asked),
+    Waiting,
+    State(Stated),
 }
 
 /// A client that has joined a server, for a simulation that calls instead of being called: [`wait`](Self::wait) for a
@@ -247,17 +303,31 @@ impl Connection {
         told: &mut dyn FnMut(&str),
     ) -> Result<Asked, Ended> {
         loop {
-            let steps = self.client.steps();
-            let frame = self.line.receive(limit);
-            // The line does not know the number of steps.
-            let frame = frame.map_err(|ended| Ended { steps, ..ended })?;
-            match self.client.receive(frame) {
-                Ok(Some(asked)) => return Ok(asked),
-                Ok(None) => told(self.client.waits_for()),
-                Err(ended) => {
-                    self.give_up(&ended.reason);
-                    return Err(ended);
+            match self.hear(limit)? {
+                Heard::Asked(asked) => return Ok(asked),
+                Heard::Waiting => told(self.client.waits_for()),
+                Heard::State(Stated::Save(sequence)) => {
+                    self.client.saved(sequence, Err(NO_STATE.to_owned()));
+                    self.line.send(self.client.frame());
                 }
+                // It has given no state.
+                Heard::State(Stated::Restore { .. }) => self.give_up(NO_STATE),
+            }
+        }
+    }
+
+    /// Receives one frame.
+    fn hear(&mut self, limit: Nanos) -> Result<Heard, Ended> {
+        let steps = self.client.steps();
+        let frame = self.line.receive(limit);
+        // The line does not know the number of steps.
+        let frame = frame.map_err(|ended| Ended { steps, ..ended })?;
+        match self.client.receive(frame) {
+            Ok(Some(asked)) => Ok(Heard::Asked(asked)),
+            Ok(None) => Ok(self.client.state.take().map_or(Heard::Waiting, Heard::State)),
+            Err(ended) => {
+                self.give_up(&ended.reason);
+                Err(ended)
             }
         }
     }
@@ -303,8 +373,27 @@ impl Connection {
     pub fn run(mut self, participant: &mut dyn Participant) -> Result<Outcome, Ended> {
         let mut writes = vec![0; self.client.declaration.writes.len()];
         loop {
-            let asked = self.wait_telling(Nanos::MAX, &mut |whom| participant.waiting(whom));
-            match asked? {
+            let asked = match self.hear(Nanos::MAX)? {
+                Heard::Asked(asked) => asked,
+                Heard::Waiting => {
+                    participant.waiting(self.client.waits_for());
+                    continue;
+                }
+                Heard::State(Stated::Save(sequence)) => {
+                    self.client.saved(sequence, participant.save());
+                    self.line.send(self.client.frame());
+                    continue;
+                }
+                Heard::State(Stated::Restore { writes: old, state }) => {
+                    writes = old;
+                    match participant.restore(&state) {
+                        Ok(()) => self.answer(&writes),
+                        Err(reason) => self.give_up(&reason),
+                    }
+                    continue;
+                }
+            };
+            match asked {
                 Asked::Initial => participant.initial(&mut writes),
                 Asked::Step(step) => {
                     let ran = participant.run(step, self.client.reads(), &mut writes);

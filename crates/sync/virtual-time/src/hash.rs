@@ -3,6 +3,7 @@
 use std::fmt;
 use std::hash::Hasher as _;
 
+use serde::{Deserialize, Serialize};
 use siphasher::sip::SipHasher24;
 
 use crate::{Declaration, Step, Variable};
@@ -21,7 +22,7 @@ impl fmt::Display for TraceHash {
 }
 
 /// Hashes a run in progress; allocates nothing.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Trace(SipHasher24);
 
 impl Trace {

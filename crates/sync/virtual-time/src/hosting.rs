@@ -144,8 +144,12 @@ pub fn hear(server: &mut Server<'_>, now: Nanos, seat: usize, frame: &[u8]) {
             if version >= wire::DIRECT {
                 server.can_meet(seat);
             }
+            if version >= wire::STATE {
+                server.can_save(seat);
+            }
             server.join(now, seat, declaration);
         }
+        Ok(FromClient::Saved { sequence, state }) => server.has_saved(now, seat, sequence, state),
         Ok(FromClient::GiveUp(reason)) => server.gave_up(seat, reason),
         Ok(FromClient::At { token, address }) => server.is_at(now, seat, token, address),
         Ok(FromClient::Met { token, reason }) => server.has_met(now, seat, token, reason),

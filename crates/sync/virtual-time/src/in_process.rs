@@ -36,10 +36,15 @@ pub fn run(
         while let Some((seat, message)) = server.poll() {
             locals.take(seat, &message);
         }
-        if let (Some(Ok((_, content))), Some(file)) = (server.take_saved(), server.saved_to())
-            && let Err(error) = saved_run::write(file, &content)
+        let saved = server.take_saved().zip(server.saved_to());
+        let written = saved.map(|(saved, file)| {
+            let (_, content) = saved?;
+            saved_run::write(file, &content).map_err(|error| format!("{}: {error}", file.display()))
+        });
+        if let Some(Err(why)) = written
+            && !matches!(server.outcome(), Some(Err(_)))
         {
-            let reason = format!("the run was not saved: {}: {error}", file.display());
+            let reason = format!("the run was not saved: {why}");
             return Err(Ended::before(Cause::System, reason));
         }
         if let Some(outcome) = server.outcome() {

@@ -17,6 +17,9 @@ struct Local<'p> {
     /// The virtual time of one step of the server.
     length: Nanos,
     asked: Option<Asked>,
+    /// The step after which the server wants the state, or the state to take over.
+    saves: Option<u64>,
+    restores: Option<(u64, Vec<u8>)>,
     reads: Vec<u64>,
     writes: Vec<u64>,
     end: Option<Result<Outcome, Ended>>,
@@ -43,10 +46,13 @@ impl<'p> Locals<'p> {
                 seat,
                 length: Nanos::ZERO,
                 asked: None,
+                saves: None,
+                restores: None,
                 reads: vec![0; declaration.reads.len()],
                 writes: vec![0; declaration.writes.len()],
                 end: None,
             };
+            server.can_save(seat);
             server.join(now, seat, declaration);
             local
         };
@@ -68,6 +74,15 @@ impl<'p> Locals<'p> {
             ToClient::Step { step, reads } => {
                 local.reads.copy_from_slice(reads);
                 local.asked = Some(Asked::Step(*step));
+            }
+            ToClient::Save(step) => local.saves = Some(*step),
+            ToClient::Restore {
+                sequence,
+                writes,
+                state,
+            } => {
+                local.writes.copy_from_slice(writes);
+                local.restores = Some((*sequence, state.to_vec()));
             }
             // Participants on the server's thread cannot meet others.
             ToClient::Waiting(_)
@@ -94,6 +109,21 @@ impl<'p> Locals<'p> {
                 writes,
                 ..
             } = local;
+            if let Some(step) = local.saves.take() {
+                has_run = true;
+                let state = participant.save();
+                let state = state.as_deref().map_err(|reason| &**reason);
+                server.has_saved(now, *seat, step, state);
+                continue;
+            }
+            if let Some((step, state)) = local.restores.take() {
+                has_run = true;
+                match participant.restore(&state) {
+                    Ok(()) => server.done(now, *seat, step, writes.iter().copied()),
+                    Err(reason) => server.gave_up(*seat, &reason),
+                }
+                continue;
+            }
             let (sequence, ran) = match local.asked.take() {
                 Some(Asked::Initial) => {
                     participant.initial(writes);

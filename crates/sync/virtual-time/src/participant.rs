@@ -32,6 +32,27 @@ pub trait Participant {
         None
     }
 
+    /// The state after the last [`run`](Self::run), as bytes of its own format, at most
+    /// [`LONGEST_STATE`](crate::wire::LONGEST_STATE): asked when the run is saved. A client that has none to give runs its
+    /// steps again when the run is restored.
+    ///
+    /// # Errors
+    ///
+    /// The reason why it has none.
+    fn save(&mut self) -> Result<Vec<u8>, String> {
+        Err("it has no way to save its state".to_owned())
+    }
+
+    /// Takes over a [saved](Self::save) state, after [`initial`](Self::initial) and before the next [`run`](Self::run).
+    ///
+    /// # Errors
+    ///
+    /// The reason why it cannot; this ends the run for everyone.
+    fn restore(&mut self, state: &[u8]) -> Result<(), String> {
+        let _ = state;
+        Err("it has no way to restore its state".to_owned())
+    }
+
     /// The server waits, and this client has nothing to do: other clients have to join or to finish a step, or the run is
     /// paused. `for_whom` is a text for people, such as `"plc" to finish step 42`. Over TCP and Unix sockets this is
     /// called about once a second while the wait lasts; a shorter wait has no call. It is never called through shared

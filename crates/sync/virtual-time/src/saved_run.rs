@@ -1,8 +1,8 @@
 //! Runs that were saved at a step, as files.
 //!
-//! The file has the clients, all commits up to the step, and when each client runs next. In the restored run every client
-//! runs its steps again from what it had read, as a member that comes back does; so no client has to be able to save its
-//! state, and a client that computes something else is noticed.
+//! The file has the clients with their states, as far as they have given them, and when each of them runs next; the values
+//! and the trace; and all commits up to the step, if they are kept. In the restored run a client takes over its state, or
+//! runs its steps again from what it had read, as a member that comes back does.
 //!
 //! All numbers are little-endian: `TICKSYNC`, 4 bytes version, 8 bytes length of the content, the content, and 8 bytes
 //! SipHash-2-4 of all bytes before, with a key of zeros.
@@ -16,7 +16,8 @@ use siphasher::sip::SipHasher24;
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 
-use crate::bytes::{Reader, count, declared, read_declared};
+use crate::bytes::{Reader, count, declared, read_declared, slots};
+use crate::hash::Trace;
 use crate::memory::{self, Memory};
 use crate::{Declaration, TraceHash};
 
@@ -32,22 +33,47 @@ const HEAD: usize = 20;
 /// The bytes behind the content.
 const TAIL: usize = 8;
 
-/// The largest file: the memory of a run, and the names of its clients and variables.
-const LARGEST: u64 = 2 * memory::MOST_SAVED as u64 + (64 << 20);
+/// The most clients of one run.
+pub(crate) const MOST_CLIENTS: usize = 1000;
+
+/// The longest state of a client, in bytes.
+pub const LONGEST_STATE: usize = 500_000;
+
+/// The largest file: the memory of a run, the states of its clients, and the names of its variables.
+const LARGEST: u64 =
+    2 * memory::MOST_SAVED as u64 + (MOST_CLIENTS * LONGEST_STATE) as u64 + (64 << 20);
 
 /// A run that was saved at a step.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub struct SavedRun {
     /// The virtual time of one step.
     pub(crate) length: Nanos,
     /// The last step that was committed.
     pub(crate) step: u64,
-    /// The trace hash up to this step.
-    pub(crate) hash: TraceHash,
-    /// The clients in the order of their names, each with the step in which it runs next.
-    pub(crate) clients: Vec<(Declaration, u64)>,
-    /// All commits.
-    pub(crate) memory: Memory,
+    /// The trace up to this step.
+    pub(crate) trace: Trace,
+    /// The values of all variables.
+    pub(crate) values: Vec<u64>,
+    /// The clients in the order of their names.
+    pub(crate) clients: Vec<ClientState>,
+    /// All commits; `None` if all clients have states, and the run was longer than the memory.
+    pub(crate) memory: Option<Memory>,
+}
+
+/// A client of a saved run.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct ClientState {
+    pub(crate) declaration: Declaration,
+    /// The step in which it runs next.
+    pub(crate) next: u64,
+    /// `None`: it runs its steps again.
+    pub(crate) state: Option<Vec<u8>>,
+}
+
+impl PartialEq for SavedRun {
+    fn eq(&self, other: &Self) -> bool {
+        self.to_bytes() == other.to_bytes()
+    }
 }
 
 impl SavedRun {
@@ -57,22 +83,22 @@ impl SavedRun {
     }
 
     /// The trace hash of these steps.
-    pub const fn hash(&self) -> TraceHash {
-        self.hash
+    pub fn hash(&self) -> TraceHash {
+        self.trace.hash()
     }
 
     /// The names of the clients, in their order.
     pub fn clients(&self) -> impl ExactSizeIterator<Item = &str> {
         self.clients
             .iter()
-            .map(|(declaration, _)| &*declaration.name)
+            .map(|client| &*client.declaration.name)
     }
 
     /// Checks that a client is the one that it was, or returns the difference.
     pub(crate) fn takes(&self, declaration: &Declaration) -> Result<(), String> {
         let name = &declaration.name;
-        let mut clients = self.clients.iter();
-        let Some((was, _)) = clients.find(|(was, _)| was.name == *name) else {
+        let mut clients = self.clients.iter().map(|client| &client.declaration);
+        let Some(was) = clients.find(|was| was.name == *name) else {
             return Err(format!(
                 "the saved run has no client of the name \"{name}\""
             ));
@@ -106,10 +132,25 @@ impl SavedRun {
         })
     }
 
+    /// The line for people at the start of the restored run.
+    pub(crate) fn news(&self) -> String {
+        let step = self.step;
+        let again = self.clients.iter().filter(|client| client.state.is_none());
+        let what = match (again.count(), self.clients.len()) {
+            (0, _) => "the clients take over their states".to_owned(),
+            (again, all) if again == all => {
+                format!("the clients run the steps up to {step} again")
+            }
+            (again, all) => format!(
+                "{again} of {all} clients run the steps up to {step} again, the others take over their states"
+            ),
+        };
+        format!("all have joined: {what}, then the run continues")
+    }
+
     /// The content of the file.
     pub fn to_bytes(&self) -> Vec<u8> {
-        let clients = self.clients.iter().map(|(client, next)| (client, *next));
-        to_bytes((self.length, self.step, self.hash), clients, &self.memory)
+        to_bytes(self, self.memory.as_ref())
     }
 
     /// Reads the content of a file.
@@ -160,52 +201,87 @@ impl SavedRun {
         if step > (i64::MAX / length.0).unsigned_abs() {
             return Err(format!("ends with step {step}, behind all virtual time"));
         }
-        let hash = TraceHash(reader.word()?);
-        let mut clients: Vec<(Declaration, u64)> = Vec::new();
+        let length_of_trace = reader_count(&mut reader)?;
+        let trace = reader.bytes(length_of_trace)?;
+        let trace =
+            postcard::from_bytes(trace).map_err(|_| "has a trace that is none".to_owned())?;
+        let mut clients: Vec<ClientState> = Vec::new();
         for _ in 0..u16::from_le_bytes(reader.take()?) {
             let declaration = read_declared(&mut reader, true)?;
-            clients.push((declaration, reader.word()?));
+            let next = reader.word()?;
+            let state = match reader.byte()? {
+                0 => None,
+                _ => {
+                    let length = reader_count(&mut reader)?;
+                    Some(reader.bytes(length)?.to_vec())
+                }
+            };
+            clients.push(ClientState {
+                declaration,
+                next,
+                state,
+            });
         }
-        if !clients.is_sorted_by(|a, b| a.0.name < b.0.name) {
+        if !clients.is_sorted_by(|a, b| a.declaration.name < b.declaration.name) {
             return Err("has clients that are not in the order of their names".to_owned());
         }
-        let variables = clients
-            .iter()
-            .map(|(declaration, _)| declaration.writes.len());
-        let size = (clients.len(), variables.sum());
-        let memory = Memory::read(&mut reader, size, step)
-            .map_err(|what| format!("has a memory that is wrong: {what}"))?;
+        let variables = clients.iter().map(|client| client.declaration.writes.len());
+        let variables: usize = variables.sum();
+        let values = reader.words(variables as u64)?.iter().collect();
+        let memory = match reader.byte()? {
+            0 if clients.iter().all(|client| client.state.is_some()) => None,
+            0 => return Err("has neither commits nor all states".to_owned()),
+            _ => {
+                let memory = Memory::read(&mut reader, (clients.len(), variables), step);
+                Some(memory.map_err(|what| format!("has a memory that is wrong: {what}"))?)
+            }
+        };
         reader.finish()?;
         Ok(Self {
             length,
             step,
-            hash,
+            trace,
+            values,
             clients,
             memory,
         })
     }
 }
 
-/// The content of the file of a run with steps of this length, after this step and with this trace hash: its clients in
-/// the order of their names, each with the step in which it runs next, and all commits.
-pub(crate) fn to_bytes<'c>(
-    (length, step, hash): (Nanos, u64, TraceHash),
-    clients: impl ExactSizeIterator<Item = (&'c Declaration, u64)>,
-    memory: &Memory,
-) -> Vec<u8> {
+/// A number of bytes that follow.
+fn reader_count(reader: &mut Reader<'_>) -> Result<usize, String> {
+    reader.half().map(|count| count as usize)
+}
+
+/// The content of the file of a run with these commits.
+pub(crate) fn to_bytes(run: &SavedRun, memory: Option<&Memory>) -> Vec<u8> {
     let mut out = Vec::new();
+    let counted = |out: &mut Vec<u8>, bytes: &[u8]| {
+        let count = u32::try_from(bytes.len()).expect("a state has its limit");
+        out.extend_from_slice(&count.to_le_bytes());
+        out.extend_from_slice(bytes);
+    };
     out.extend_from_slice(&MAGIC);
     out.extend_from_slice(&VERSION.to_le_bytes());
     out.extend_from_slice(&[0; 8]);
-    out.extend_from_slice(&length.0.to_le_bytes());
-    out.extend_from_slice(&step.to_le_bytes());
-    out.extend_from_slice(&hash.0.to_le_bytes());
-    count(&mut out, clients.len());
-    for (declaration, next) in clients {
-        declared(&mut out, declaration);
-        out.extend_from_slice(&next.to_le_bytes());
+    out.extend_from_slice(&run.length.0.to_le_bytes());
+    out.extend_from_slice(&run.step.to_le_bytes());
+    let trace = postcard::to_stdvec(&run.trace).expect("into a vector");
+    counted(&mut out, &trace);
+    count(&mut out, run.clients.len());
+    for client in &run.clients {
+        declared(&mut out, &client.declaration);
+        out.extend_from_slice(&client.next.to_le_bytes());
+        out.push(client.state.is_some().into());
+        if let Some(state) = &client.state {
+            counted(&mut out, state);
+        }
     }
-    memory.write(&mut out);
+    slots(&mut out, &run.values);
+    out.push(memory.is_some().into());
+    if let Some(memory) = memory {
+        memory.write(&mut out);
+    }
     let content = (out.len() - HEAD) as u64;
     out[HEAD - 8..HEAD].copy_from_slice(&content.to_le_bytes());
     let sum = sum(&out);
@@ -267,9 +343,16 @@ mod tests {
         SavedRun {
             length: Nanos::from_millis(1),
             step: 4,
-            hash: TraceHash(7),
-            clients: vec![(plc, 5), (tank, 9)],
-            memory,
+            trace: Trace::new(1, &[], &[]),
+            values: vec![1],
+            clients: [(plc, 5, None), (tank, 9, Some(vec![1, 2, 3]))]
+                .map(|(declaration, next, state)| ClientState {
+                    declaration,
+                    next,
+                    state,
+                })
+                .into(),
+            memory: Some(memory),
         }
     }
 
@@ -326,9 +409,12 @@ mod tests {
                 };
                 right += 1;
                 for client in 0..run.clients.len() {
-                    let mut place = run.memory.start();
-                    while run.memory.next(&mut place, client).is_some() {
-                        run.memory.pass(&mut place);
+                    let Some(memory) = &run.memory else {
+                        continue;
+                    };
+                    let mut place = memory.start();
+                    while memory.next(&mut place, client).is_some() {
+                        memory.pass(&mut place);
                     }
                 }
             }
@@ -339,7 +425,7 @@ mod tests {
     #[test]
     fn a_memory_without_initial_values_is_refused() {
         let mut run = saved();
-        run.memory = Memory::default();
+        run.memory = Some(Memory::default());
         let (at, what) = SavedRun::parse(&run.to_bytes()).expect_err("nothing to begin with");
         assert_eq!(at, HEAD);
         assert!(what.ends_with("it has no initial values"), "{what}");

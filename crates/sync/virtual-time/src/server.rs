@@ -213,6 +213,7 @@ impl<'l> Server<'l> {
         self.seats[seat] = Seat::Silent(now);
         self.informed.remove(&seat);
         self.able.remove(&seat);
+        self.saving.connected(seat);
         if self.outcome().is_some() {
             self.seats[seat] = Seat::Leaving;
             self.outbox.push_back(Out::End(seat));
@@ -349,6 +350,7 @@ impl<'l> Server<'l> {
             Seat::Free | Seat::Silent(_) | Seat::Leaving => {}
         }
         self.outbox.retain(|out| out.seat() != seat);
+        self.saving.gone(seat);
     }
 
     /// The client at `seat` violates the protocol: it is excluded, or, once the run has started, ends it.

@@ -11,18 +11,23 @@ use tickbus_base::time::Nanos;
 use tickbus_image::signal::DataType;
 
 pub use crate::bytes::Slots;
-use crate::bytes::{Reader, code, declared, place_code, read_declared, slots};
+use crate::bytes::{Reader, code, count, declared, place_code, read_declared, slots};
 use crate::server::ToClient;
 use crate::{Cause, Declaration, Ended, MemberList, Outcome, Step, TraceHash};
 pub use between::{at, hello, is_done, met, read_hello};
 pub(crate) use between::{done_step, is_end};
 
 /// The version of this format. Joins of version 1 have no interval, and their clients get no [`ToClient::Waiting`] and
-/// ask for no step. Clients of version 2 exchange nothing with each other.
-pub const VERSION: u16 = 3;
+/// ask for no step. Clients of version 2 exchange nothing with each other, and those of version 3 save no state.
+pub const VERSION: u16 = 4;
 
 /// The first version whose clients can exchange their values without the server.
 pub(crate) const DIRECT: u16 = 3;
+
+/// The first version whose clients can save their states.
+pub(crate) const STATE: u16 = 4;
+
+pub use crate::saved_run::LONGEST_STATE;
 
 /// The oldest version that a server accepts.
 const OLDEST: u16 = 1;
@@ -32,6 +37,9 @@ pub const LONGEST_FRAME: usize = 1 << 20;
 
 /// The bytes of a frame's length.
 pub const HEADER: usize = 4;
+
+/// The values that a client writes and its state fit into one frame.
+const _: () = assert!(11 + 8 * 65_535 + LONGEST_STATE <= LONGEST_FRAME);
 
 /// The longest reason, in bytes; longer ones are cut.
 const LONGEST_REASON: usize = 4096;
@@ -46,6 +54,7 @@ const DONE_UNTIL: u8 = 0x04;
 const AT: u8 = 0x05;
 const MET: u8 = 0x06;
 const HELLO: u8 = 0x07;
+const SAVED: u8 = 0x08;
 const START: u8 = 0x81;
 const STEP: u8 = 0x82;
 const FINISHED: u8 = 0x83;
@@ -54,6 +63,8 @@ const WAITING: u8 = 0x85;
 const MEET: u8 = 0x86;
 const MEMBERS: u8 = 0x87;
 const UNTIL: u8 = 0x88;
+const SAVE: u8 = 0x89;
+const RESTORE: u8 = 0x8A;
 
 /// A message of a client.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -90,6 +101,13 @@ pub enum FromClient<'a> {
         /// Why not all clients could be reached; empty if all were.
         reason: &'a str,
     },
+    /// The answer to [`ToClient::Save`].
+    Saved {
+        /// The step.
+        sequence: u64,
+        /// The state of the client after it, or why it has none to give.
+        state: Result<&'a [u8], &'a str>,
+    },
 }
 
 /// A message of the server, as a client reads it.
@@ -119,6 +137,17 @@ pub enum FromServer<'a> {
     Members(MemberList),
     /// See [`ToClient::Until`].
     Until(u64),
+    /// See [`ToClient::Save`].
+    Save(u64),
+    /// See [`ToClient::Restore`].
+    Restore {
+        /// The step.
+        sequence: u64,
+        /// The values that the client had written.
+        writes: Slots<'a>,
+        /// Its state.
+        state: &'a [u8],
+    },
 }
 
 /// The length of the frame at the beginning of `bytes`, with its header, if already known.
@@ -206,6 +235,25 @@ pub fn give_up(out: &mut Vec<u8>, reason: &str) {
     });
 }
 
+/// Appends the state of a client after the step `sequence`, or why it has none to give.
+///
+/// # Panics
+///
+/// If the state is longer than [`LONGEST_STATE`].
+pub fn saved(out: &mut Vec<u8>, sequence: u64, state: Result<&[u8], &str>) {
+    append(out, SAVED, |out| {
+        out.extend_from_slice(&sequence.to_le_bytes());
+        out.push(state.is_ok().into());
+        match state {
+            Ok(state) => {
+                assert!(state.len() <= LONGEST_STATE, "a state has its limit");
+                out.extend_from_slice(state);
+            }
+            Err(reason) => out.extend_from_slice(cut(reason).as_bytes()),
+        }
+    });
+}
+
 /// Appends a message of the server.
 pub fn to_client(out: &mut Vec<u8>, message: &ToClient<'_>) {
     match message {
@@ -229,6 +277,19 @@ pub fn to_client(out: &mut Vec<u8>, message: &ToClient<'_>) {
         }),
         ToClient::Until(step) => append(out, UNTIL, |out| {
             out.extend_from_slice(&step.to_le_bytes());
+        }),
+        ToClient::Save(step) => append(out, SAVE, |out| {
+            out.extend_from_slice(&step.to_le_bytes());
+        }),
+        ToClient::Restore {
+            sequence,
+            writes,
+            state,
+        } => append(out, RESTORE, |out| {
+            out.extend_from_slice(&sequence.to_le_bytes());
+            count(out, writes.len());
+            slots(out, writes);
+            out.extend_from_slice(state);
         }),
         ToClient::End(Ok(outcome)) => append(out, FINISHED, |out| {
             out.extend_from_slice(&outcome.steps.to_le_bytes());
@@ -285,6 +346,22 @@ pub fn from_client(frame: &[u8]) -> Result<FromClient<'_>, String> {
             token: reader.word()?,
             reason: reader.rest_as_text()?,
         },
+        SAVED => FromClient::Saved {
+            sequence: reader.word()?,
+            state: match reader.byte()? {
+                0 => Err(reader.rest_as_text()?),
+                1 => match reader.rest() {
+                    long if long.len() > LONGEST_STATE => {
+                        return Err(format!(
+                            "sent a state of {} bytes, {LONGEST_STATE} at most",
+                            long.len()
+                        ));
+                    }
+                    state => Ok(state),
+                },
+                other => return Err(format!("sent a state of the unknown kind {other}")),
+            },
+        },
         kind => return Err(format!("sent a message of the unknown kind 0x{kind:02X}")),
     };
     reader.finish()?;
@@ -336,6 +413,15 @@ pub fn from_server(frame: &[u8]) -> Result<FromServer<'_>, String> {
         MEET => FromServer::Meet(reader.word()?),
         MEMBERS => FromServer::Members(between::read_members(&mut reader)?),
         UNTIL => FromServer::Until(reader.word()?),
+        SAVE => FromServer::Save(reader.word()?),
+        RESTORE => FromServer::Restore {
+            sequence: reader.word()?,
+            writes: {
+                let count = u16::from_le_bytes(reader.take()?);
+                reader.words(count.into())?
+            },
+            state: reader.rest(),
+        },
         FINISHED => FromServer::End(Ok(Outcome {
             steps: reader.word()?,
             time: nanos(reader.word()?),

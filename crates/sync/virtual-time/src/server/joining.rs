@@ -4,10 +4,8 @@ use tickbus_base::Mistake;
 
 use crate::declaration::check_name;
 use crate::members::{Client, Members};
+pub(crate) use crate::saved_run::MOST_CLIENTS;
 use crate::{Declaration, StartCondition};
-
-/// The most clients of one run.
-pub(crate) const MOST_CLIENTS: usize = 1000;
 
 /// The clients that have joined before the start.
 #[derive(Debug)]

@@ -50,6 +50,18 @@ pub enum ToClient<'a> {
     /// The clients exchange their values without the server up to this step, inclusive. Sent before the start for the
     /// first time, with step 0. Without it, the server passes the values on.
     Until(u64),
+    /// The client answers with its state after this step, or why it has none to give.
+    Save(u64),
+    /// The client takes over the state that it had after the step `sequence`, and answers with the values that it had
+    /// written, as those of this step. Sent in place of a step.
+    Restore {
+        /// The step.
+        sequence: u64,
+        /// The values, in the order of its declaration.
+        writes: &'a [u64],
+        /// The state.
+        state: &'a [u8],
+    },
     /// The run has ended, or the client does not take part in it. No message follows.
     End(&'a Result<Outcome, Ended>),
 }

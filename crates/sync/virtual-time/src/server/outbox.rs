@@ -13,6 +13,8 @@ pub(super) enum Out {
     Meet(usize),
     Members(usize, usize),
     Until(usize),
+    Save(usize, u64),
+    Restore(usize),
     End(usize),
     Refused(usize, Box<Ended>),
 }
@@ -27,6 +29,8 @@ impl Out {
             | Self::Meet(seat)
             | Self::Members(seat, _)
             | Self::Until(seat)
+            | Self::Save(seat, _)
+            | Self::Restore(seat)
             | Self::End(seat)
             | Self::Refused(seat, _) => *seat,
         }
@@ -62,6 +66,10 @@ impl Server<'_> {
                 None => ToClient::Meet(0),
             },
             (Out::Until(_), ..) => ToClient::Until(self.allowed.as_ref().map_or(0, Allowed::until)),
+            (Out::Save(_, step), ..) => ToClient::Save(step),
+            (Out::Restore(_), Phase::Running(barrier, _), Seat::Back(client)) => {
+                self.rejoining.state(client, barrier)
+            }
             (Out::Refused(_, ended), ..) => {
                 self.seats[seat] = Seat::Free;
                 self.refused = Err(*ended);

@@ -32,6 +32,9 @@ impl Server<'_> {
                 Phase::Running(..) if self.misses_members() && self.awaited().is_none() => {
                     self.stop_by.unwrap_or(Nanos::MAX)
                 }
+                Phase::Running(..) if self.saving.until(self.settings.hang).is_some() => {
+                    self.saving.until(self.settings.hang).unwrap_or(Nanos::MAX)
+                }
                 Phase::Running(barrier, _) if barrier.state() == State::PreRead => {
                     match (self.is_paused() && !self.has_run_ahead(), &self.pace) {
                         (true, _) => Nanos::MAX,
@@ -60,6 +63,7 @@ impl Server<'_> {
             }
         }
         self.check_rejoin(now);
+        self.end_of_collecting(now);
         match &self.phase {
             Phase::Joining(joining, _)
                 if self.meeting.is_none() && now >= self.asked + self.settings.join =>
@@ -128,6 +132,9 @@ impl Server<'_> {
                 0 => format!("\"{name}\" {what}"),
                 more => format!("\"{name}\" {what}, and for {more} more"),
             };
+        }
+        if let Some(seat) = self.saving.awaited() {
+            return format!("\"{}\" to save its state", shown(self.name(seat).unwrap_or_default()));
         }
         let mut owing = (barrier.owing()).map(|client| shown(&barrier.declaration(client).name));
         let named: Vec<String> = (owing.by_ref().take(MOST_NAMED))

@@ -5,10 +5,10 @@ use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::printable;
 
 use super::{Out, Phase, Seat, Server, ToClient};
-use crate::barrier::State;
+use crate::barrier::{Barrier, State};
 use crate::memory::{MOST, MOST_SAVED, Memory, Place};
 use crate::step::step_of;
-use crate::{Cause, Declaration, Settings};
+use crate::{Cause, Declaration, SavedRun, Settings};
 
 /// The members that are missing, and the memory of the run.
 #[derive(Debug)]
@@ -41,17 +41,22 @@ struct Replay {
     asked: Option<u64>,
     asked_at: Nanos,
     reads: Vec<u64>,
+    /// The state that the member takes over after its initial values, in place of running its steps.
+    state: Option<Vec<u8>>,
+    has_restored: bool,
 }
 
 impl Replay {
     /// The member at `seat` is asked from the beginning.
-    fn begin(seat: usize, now: Nanos, memory: &Memory) -> Self {
+    fn begin(seat: usize, now: Nanos, memory: Option<&Memory>) -> Self {
         Self {
             seat,
-            place: memory.start(),
+            place: memory.unwrap_or(&Memory::default()).start(),
             asked: Some(0),
             asked_at: now,
             reads: Vec::new(),
+            state: None,
+            has_restored: false,
         }
     }
 }
@@ -67,16 +72,31 @@ impl Rejoining {
         }
     }
 
-    /// The run was restored: the clients at `seats` are asked again for all steps of `memory`.
-    pub(super) fn begin_again(&mut self, now: Nanos, seats: &[usize], memory: Memory) {
-        let away = seats.iter().enumerate().map(|(client, seat)| Away {
+    /// The run was restored: the clients at `seats` take over their states, or are asked again for all steps.
+    pub(super) fn begin_again(&mut self, now: Nanos, seats: &[usize], saved: SavedRun) {
+        let clients = seats.iter().zip(saved.clients).enumerate();
+        let away = clients.map(|(client, (seat, saved_client))| Away {
             client,
             reason: String::new(),
             since: None,
-            replay: Some(Replay::begin(*seat, now, &memory)),
+            replay: Some(Replay {
+                state: saved_client.state,
+                ..Replay::begin(*seat, now, saved.memory.as_ref())
+            }),
         });
         self.away = away.collect();
-        self.memory = Some(memory);
+        self.memory = saved.memory;
+    }
+
+    /// The message by which a client takes over its state.
+    pub(super) fn state<'m>(&'m self, client: usize, barrier: &'m Barrier<'_>) -> ToClient<'m> {
+        let away = self.away_of(client).and_then(|at| self.away.get(at));
+        let replay = away.and_then(|away| away.replay.as_ref());
+        ToClient::Restore {
+            sequence: barrier.step().sequence,
+            writes: &barrier.committed()[barrier.writes(client)],
+            state: (replay.and_then(|replay| replay.state.as_deref())).unwrap_or_default(),
+        }
     }
 
     /// The members that have come back were asked for their initial values by `now`.
@@ -85,6 +105,11 @@ impl Rejoining {
         for replay in replays.filter(|replay| replay.asked == Some(0)) {
             replay.asked_at = now;
         }
+    }
+
+    /// True if no member is missing.
+    pub(super) fn is_complete(&self) -> bool {
+        self.away.is_empty()
     }
 
     /// True if commits are kept.
@@ -227,8 +252,7 @@ impl Server<'_> {
                 declaration.name
             ));
         }
-        let memory = memory.as_ref().expect("kept while members are missing");
-        away.replay = Some(Replay::begin(seat, now, memory));
+        away.replay = Some(Replay::begin(seat, now, memory.as_ref()));
         seats[away.client] = seat;
         self.seats[seat] = Seat::Back(away.client);
         self.outbox.push_back(Out::Start(seat));
@@ -259,30 +283,18 @@ impl Server<'_> {
         let (rejoining, Phase::Running(barrier, _)) = (&mut self.rejoining, &self.phase) else {
             return;
         };
-        let memory = rejoining.memory.as_ref();
-        let mut away = rejoining.away.iter_mut();
-        let Some((
-            Away {
-                client,
-                replay: Some(replay),
-                ..
-            },
-            memory,
-        )) = away
-            .find(|away| {
-                away.replay
-                    .as_ref()
-                    .is_some_and(|replay| replay.seat == seat)
-            })
-            .zip(memory)
-        else {
+        let mut replays = rejoining.away.iter_mut().filter_map(|away| {
+            let client = away.client;
+            away.replay.as_mut().map(|replay| (client, replay))
+        });
+        let Some((client, replay)) = replays.find(|(_, replay)| replay.seat == seat) else {
             return;
         };
         if replay.asked != Some(sequence) {
             let reason = format!("answered step {sequence}, for which it was not asked again");
             return self.violated(seat, &reason);
         }
-        let range = barrier.writes(*client);
+        let range = barrier.writes(client);
         if values.len() != range.len() {
             let reason = format!(
                 "wrote {} values in step {sequence}, expected {}",
@@ -291,9 +303,18 @@ impl Server<'_> {
             );
             return self.violated(seat, &reason);
         }
-        memory.pass(&mut replay.place);
         replay.asked = None;
-        let mut pairs = values.zip(replay.place.of(range.clone())).zip(range);
+        let had_written = match &rejoining.memory {
+            _ if replay.state.is_some() && sequence > 0 => &barrier.committed()[range.clone()],
+            Some(memory) => {
+                memory.pass(&mut replay.place);
+                replay.place.of(range.clone())
+            }
+            // The initial values are not kept.
+            None => &[],
+        };
+        let has_restored = replay.state.is_some() && sequence > 0;
+        let mut pairs = values.zip(had_written).zip(range);
         if let Some(((value, before), at)) = pairs.find(|((value, before), _)| value != *before) {
             let variable = &barrier.members().variables[at].name;
             let reason = format!(
@@ -301,6 +322,9 @@ impl Server<'_> {
                  writes 0x{value:x}; a member that is to come back must compute the same from the same reads"
             );
             return self.blame(seat, Cause::Failed, &reason);
+        }
+        if has_restored {
+            replay.has_restored = true;
         }
         self.ask_again(now);
         self.advance(now);
@@ -311,9 +335,7 @@ impl Server<'_> {
         let (rejoining, Phase::Running(barrier, _)) = (&mut self.rejoining, &self.phase) else {
             return;
         };
-        let Some(memory) = &rejoining.memory else {
-            return;
-        };
+        let memory = &rejoining.memory;
         let (seats, outbox, news) = (&mut self.seats, &mut self.outbox, &mut self.news);
         let asked = &mut self.asked;
         rejoining.away.retain_mut(|Away { client, replay, .. }| {
@@ -321,7 +343,15 @@ impl Server<'_> {
                 return true;
             };
             replay.asked_at = now;
-            replay.asked = memory.next(&mut replay.place, *client);
+            if replay.state.is_some() && !replay.has_restored {
+                replay.asked = Some(barrier.step().sequence);
+                outbox.push_back(Out::Restore(replay.seat));
+                return true;
+            }
+            replay.asked = match memory {
+                Some(memory) if !replay.has_restored => memory.next(&mut replay.place, *client),
+                _ => None,
+            };
             if replay.asked.is_some() {
                 replay.place.read(barrier.reads(*client), &mut replay.reads);
                 outbox.push_back(Out::Step(replay.seat));

@@ -30,10 +30,7 @@ impl Server<'_> {
         };
         self.news.push_back(match &restored {
             None => "all have joined: the run starts".to_owned(),
-            Some(saved) => format!(
-                "all have joined: the clients run the steps up to {} again, then the run continues",
-                saved.step
-            ),
+            Some(saved) => saved.news(),
         });
         for (client, seat) in seats.iter().enumerate() {
             self.seats[*seat] = match restored {
@@ -47,7 +44,7 @@ impl Server<'_> {
         }
         self.asked = now;
         if let Some(saved) = restored {
-            self.rejoining.begin_again(now, &seats, saved.memory);
+            self.rejoining.begin_again(now, &seats, saved);
         }
         self.phase = Phase::Running(Box::new(barrier), seats);
         if let Err((cause, reason)) = started {
@@ -58,7 +55,9 @@ impl Server<'_> {
     /// Advances as far as possible.
     pub(super) fn advance(&mut self, now: Nanos) {
         for _ in 0..EMPTY_STATES {
-            self.save_if_due();
+            if self.save_if_due(now) {
+                return;
+            }
             let misses_members = self.misses_members();
             let Phase::Running(barrier, seats) = &mut self.phase else {
                 return;

@@ -40,6 +40,34 @@ impl Participant for Events {
     }
 }
 
+/// A mixer that saves its state, and counts its steps.
+struct Stateful(Mixer, u64);
+
+impl Participant for Stateful {
+    fn declare(&self) -> Declaration {
+        self.0.declare()
+    }
+
+    fn initial(&mut self, writes: &mut [u64]) {
+        self.0.initial(writes);
+    }
+
+    fn run(&mut self, step: Step, reads: &[u64], writes: &mut [u64]) -> Result<(), String> {
+        self.1 += 1;
+        self.0.run(step, reads, writes)
+    }
+
+    fn save(&mut self) -> Result<Vec<u8>, String> {
+        Ok(self.0.state().to_le_bytes().to_vec())
+    }
+
+    fn restore(&mut self, state: &[u8]) -> Result<(), String> {
+        let state = <[u8; 8]>::try_from(state).map_err(|_| "not 8 bytes".to_owned())?;
+        *self.0.state() = u64::from_le_bytes(state);
+        Ok(())
+    }
+}
+
 /// The clients of a run as they are when their processes begin: with multiples, with events, and with an interval that
 /// is no whole number of steps.
 fn clients() -> Vec<Box<dyn Participant + Send>> {
@@ -209,6 +237,44 @@ fn a_run_through_shared_memory_is_saved_and_restored() {
     let whole = run_here(mixer_settings(STEPS, CLIENTS), Logic::new());
     run("first", saving(300, &file, Some(300)));
     assert_eq!(run("second", restoring(STEPS, &file)), whole);
+}
+
+#[test]
+fn clients_with_states_take_them_over_and_the_others_run_their_steps_again() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("a.saved");
+    // Two clients with states beside one without, in one process and over TCP.
+    let run = |settings: Settings, is_here: bool| {
+        let mut mixers = mixers(CLIENTS).into_iter();
+        let [a, b, mut c] = std::array::from_fn(|_| mixers.next().expect("three"));
+        let (mut a, mut b) = (Stateful(a, 0), Stateful(b, 0));
+        let (outcome, news) = if is_here {
+            let clients: Vec<&mut dyn Participant> = vec![&mut a, &mut b, &mut c];
+            (in_process::run(settings, clients, Logic::new()), Vec::new())
+        } else {
+            let (outcome, news, ()) = serve(settings, Logic::new(), |address, _, _| {
+                thread::scope(|scope| {
+                    let clients: [&mut (dyn Participant + Send); 3] = [&mut a, &mut b, &mut c];
+                    for client in clients {
+                        scope.spawn(move || tcp::join(address, client));
+                    }
+                });
+            });
+            (outcome, news)
+        };
+        (outcome.expect("it runs"), [a.1, b.1], news)
+    };
+    let (whole, ran, _) = run(mixer_settings(STEPS, CLIENTS), true);
+    assert_eq!(ran, [1000, 500]);
+    for is_here in [true, false] {
+        let (outcome, ..) = run(saving(STEPS, &file, Some(500)), is_here);
+        assert_eq!(outcome, whole);
+        let (outcome, ran, news) = run(restoring(STEPS, &file), !is_here);
+        assert_eq!((outcome, ran), (whole, [500, 250]), "{news:#?}");
+        let line = "all have joined: 1 of 3 clients run the steps up to 500 again, the others take over their states, \
+                    then the run continues";
+        assert!(!is_here || news.iter().any(|it| it == line), "{news:#?}");
+    }
 }
 
 #[test]

@@ -85,6 +85,13 @@ impl Mixer {
     }
 }
 
+impl Mixer {
+    /// The state between two steps.
+    pub(crate) fn state(&mut self) -> &mut u64 {
+        &mut self.state
+    }
+}
+
 impl Participant for Mixer {
     fn declare(&self) -> Declaration {
         self.declaration.clone()

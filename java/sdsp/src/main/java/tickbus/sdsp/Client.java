@@ -5,25 +5,32 @@ import java.net.SocketAddress;
 import java.nio.ByteBuffer;
 import java.nio.channels.ClosedByInterruptException;
 import java.nio.charset.StandardCharsets;
+import java.util.Arrays;
 import tickbus.sdsp.EndedException.Cause;
 
 /** Lets a {@link Participant} take part in a run over TCP or a Unix socket. */
 public final class Client {
     private static final byte[] MAGIC = {'S', 'D', 'S', 'P'};
-    private static final short VERSION = 2;
+    private static final short VERSION = 4;
 
     private static final byte JOIN = 0x01;
     private static final byte DONE = 0x02;
     private static final byte GIVE_UP = 0x03;
     private static final byte DONE_UNTIL = 0x04;
+    private static final byte AT = 0x05;
+    private static final byte SAVED = 0x08;
     private static final byte START = (byte) 0x81;
     private static final byte STEP = (byte) 0x82;
     private static final byte FINISHED = (byte) 0x83;
     private static final byte ENDED = (byte) 0x84;
     private static final byte WAITING = (byte) 0x85;
+    private static final byte MEET = (byte) 0x86;
+    private static final byte SAVE = (byte) 0x89;
+    private static final byte RESTORE = (byte) 0x8A;
 
     private static final int LONGEST_NAME = 255;
     private static final int LONGEST_REASON = 4096;
+    private static final int LONGEST_STATE = 500_000;
     private static final Cause[] CAUSES = Cause.values();
 
     private final Frames frames;
@@ -135,6 +142,14 @@ public final class Client {
                         frames.expect(3 * Long.BYTES);
                         return new Outcome(in.getLong(), in.getLong(), in.getLong());
                     }
+                    case MEET -> {
+                        frames.expect(Long.BYTES);
+                        // This client cannot exchange values with others: its address is empty.
+                        frames.begin(1 + Long.BYTES, AT).putLong(in.getLong());
+                        sendIfPossible();
+                    }
+                    case SAVE -> save(in);
+                    case RESTORE -> restore(in);
                     case WAITING -> waiting(frames.text(frames.left()));
                     case ENDED -> throw ended(in);
                     default -> throw new Frames.Violation(String.format("sent a message of the unknown kind 0x%02X", kind));
@@ -201,11 +216,60 @@ public final class Client {
         done(sequence);
     }
 
+    private void save(ByteBuffer in) throws IOException {
+        frames.expect(Long.BYTES);
+        long sequence = in.getLong();
+        byte[] state;
+        boolean hasState = false;
+        try {
+            state = participant.save();
+            hasState = state.length <= LONGEST_STATE;
+            if (!hasState) {
+                state = reason("its state has " + state.length + " bytes, " + LONGEST_STATE + " at most");
+            }
+        } catch (Exception e) {
+            state = reason(text(e));
+        }
+        frames.begin(2 + Long.BYTES + state.length, SAVED).putLong(sequence).put((byte) (hasState ? 1 : 0)).put(state);
+        sendIfPossible();
+    }
+
+    private void restore(ByteBuffer in) throws IOException {
+        frames.expect(Long.BYTES + Short.BYTES);
+        long sequence = in.getLong();
+        int count = Short.toUnsignedInt(in.getShort());
+        if (ran != 0 || count != writes.length) {
+            throw new Frames.Violation("restores another state");
+        }
+        frames.expect(count * Long.BYTES);
+        for (int at = 0; at < count; at++) {
+            writes[at] = in.getLong();
+        }
+        byte[] state = new byte[frames.left()];
+        in.get(state);
+        try {
+            participant.restore(state);
+        } catch (Throwable e) {
+            failed(e);
+            return;
+        }
+        ran = sequence;
+        ByteBuffer out = frames.begin(1 + Long.BYTES * (1 + count), DONE).putLong(sequence);
+        for (long slot : writes) {
+            out.putLong(slot);
+        }
+        sendIfPossible();
+    }
+
+    private static String text(Throwable e) {
+        return e.getMessage() == null ? e.toString() : e.getMessage();
+    }
+
     /** The participant cannot continue: everyone gets its reason. An error of the virtual machine is thrown to the caller. */
     private void failed(Throwable e) throws IOException {
         failure = e;
         // The server answers with the end.
-        giveUp(e.getMessage() == null ? e.toString() : e.getMessage());
+        giveUp(text(e));
         if (e instanceof Error error) {
             throw error;
         }
@@ -251,14 +315,20 @@ public final class Client {
     }
 
     private void giveUp(String reason) throws IOException {
+        byte[] text = reason(reason);
+        frames.begin(1 + text.length, GIVE_UP).put(text);
+        sendIfPossible();
+    }
+
+    /** A reason as it is sent: a long one is cut. */
+    private static byte[] reason(String reason) {
         byte[] text = reason.getBytes(StandardCharsets.UTF_8);
         int length = Math.min(text.length, LONGEST_REASON);
         while (length < text.length && (text[length] & 0xC0) == 0x80) {
             // Do not cut within a character.
             length--;
         }
-        frames.begin(1 + length, GIVE_UP).put(text, 0, length);
-        sendIfPossible();
+        return Arrays.copyOf(text, length);
     }
 
     private EndedException ended(ByteBuffer in) throws Frames.Violation {

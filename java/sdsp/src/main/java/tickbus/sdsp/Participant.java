@@ -48,6 +48,27 @@ public interface Participant {
     }
 
     /**
+     * The state after the last {@link #run}, as bytes of its own format: asked when the run is saved. A participant that has
+     * none to give runs its steps again when the run is restored.
+     *
+     * @return the state, at most 500,000 bytes
+     * @throws Exception if it has none; the message gives the reason
+     */
+    default byte[] save() throws Exception {
+        throw new UnsupportedOperationException("it has no way to save its state");
+    }
+
+    /**
+     * Takes over a {@linkplain #save saved} state, after {@link #initial} and before the next {@link #run}.
+     *
+     * @param state the bytes
+     * @throws Exception if it cannot; the message gives the reason, and the run ends for everyone
+     */
+    default void restore(byte[] state) throws Exception {
+        throw new UnsupportedOperationException("it has no way to restore its state");
+    }
+
+    /**
      * The server has been waiting for other clients for a second or more, or is paused. Called once a second while the
      * participant has nothing to do.
      *

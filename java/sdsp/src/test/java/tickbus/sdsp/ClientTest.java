@@ -60,7 +60,7 @@ class ClientTest {
     void aRunIsPlayedToItsEnd() throws Exception {
         Counter counter = new Counter();
         try (FakeServer server = new FakeServer(s -> {
-            ByteBuffer expected = FakeServer.buffer(40).put((byte) 1).put("SDSP".getBytes(UTF_8)).putShort((short) 2).putInt(3)
+            ByteBuffer expected = FakeServer.buffer(40).put((byte) 1).put("SDSP".getBytes(UTF_8)).putShort((short) 4).putInt(3)
                 .putLong(0).put((byte) 7).put("zähler".getBytes(UTF_8)).putShort((short) 1).put((byte) 9).put((byte) 3)
                 .put("out".getBytes(UTF_8)).putShort((short) 1).put((byte) 2).put("in".getBytes(UTF_8));
             assertEquals(expected.flip(), s.receive());

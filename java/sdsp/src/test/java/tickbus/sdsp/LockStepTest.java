@@ -80,11 +80,13 @@ class LockStepTest {
             assertEquals(HASH, plant.join().hashText());
         }
         try (Sync sync = robot("--restore", saved)) {
-            CompletableFuture<Outcome> plant = sync.join(new RobotPlant());
+            RobotPlant restored = new RobotPlant();
+            CompletableFuture<Outcome> plant = sync.join(restored);
             CompletableFuture<Outcome> plc = sync.join(new RobotProgram());
-            sync.await("sync: all have joined: the clients run the steps up to 3000 again");
+            sync.await("sync: all have joined: 1 of 2 clients run the steps up to 3000 again, the others take over");
             assertEquals(HASH, plant.join().hashText());
             assertEquals(HASH, plc.join().hashText());
+            assertEquals(1702, restored.steps);
         }
     }
 

@@ -33,7 +33,7 @@ public final class Main {
 
         NET is a file in PNML (also that of TAPAAL, ProM, pm4py, WoPeD and PIPE), a .lola file of LoLA, a .net file
         of TINA, a .hpx file of HPSim, the text that HPSim exports, or a sequential function chart in the text of
-        IEC 61131-3 (.st, .sfc), of which these commands see steps and transitions alone.
+        IEC 61131-3 (.st, .sfc) or in PLCopen XML (.xml), of which these commands see steps and transitions alone.
 
         step:
           --seed N           of chance and of random delays (default 0)

@@ -25,7 +25,7 @@ import tickbus.petri.sfc.Sfc;
 /** Reads a net from a file of any supported format. */
 final class NetFile {
     static final List<String> OPTIONS = List.of("--unit", "--delay");
-    private static final int BEGINNING = 512;
+    private static final int BEGINNING = 2_048;
 
     private NetFile() {
     }
@@ -108,7 +108,7 @@ final class NetFile {
         if (!Files.exists(file)) {
             throw new NoSuchFileException(file.toString());
         }
-        if (name.endsWith(".pnml") || name.endsWith(".xml")) {
+        if (name.endsWith(".pnml")) {
             return "pnml";
         }
         if (name.endsWith(".st") || name.endsWith(".sfc")) {
@@ -121,9 +121,17 @@ final class NetFile {
         try (InputStream bytes = Files.newInputStream(file)) {
             text = new String(bytes.readNBytes(BEGINNING), StandardCharsets.UTF_8).replaceFirst("^\\uFEFF?\\s*", "");
         }
+        if (name.endsWith(".xml")) {
+            return xml(text);
+        }
         if (name.endsWith(".lola") || text.startsWith("PLACE")) {
             return "lola";
         }
-        return name.endsWith(".net") ? "tina" : text.startsWith("<") ? "pnml" : text.startsWith("[") ? "hpx" : "text";
+        return name.endsWith(".net") ? "tina" : text.startsWith("<") ? xml(text) : text.startsWith("[") ? "hpx" : "text";
+    }
+
+    /** PLCopen XML and PNML have one ending. */
+    private static String xml(String beginning) {
+        return beginning.contains("<project") ? "sfc" : "pnml";
     }
 }

@@ -39,7 +39,8 @@ public final class Sfc {
     }
 
     /**
-     * Reads the first program or function block of a file in IEC 61131-3 text, which must be a chart.
+     * Reads the first program or function block of a file in IEC 61131-3 text, which must be a chart, or the first chart of a
+     * file in PLCopen XML.
      *
      * @throws NetException with file, line and column for what cannot be read
      */
@@ -48,12 +49,31 @@ public final class Sfc {
         if (size > MOST_BYTES) {
             throw new NetException(file.toString(), 0, "", size + " bytes; expected at most " + MOST_BYTES);
         }
-        return parse(file.toString(), new String(Files.readAllBytes(file), StandardCharsets.UTF_8));
+        byte[] bytes = Files.readAllBytes(file);
+        if (isXml(bytes)) {
+            return new SfcReader(PlcopenReader.read(file.toString(), bytes)).read();
+        }
+        return parse(file.toString(), new String(bytes, StandardCharsets.UTF_8));
+    }
+
+    /** True if the first sign behind the marks and blanks is that of XML, in any encoding. */
+    private static boolean isXml(byte[] bytes) {
+        for (byte one : bytes) {
+            if (one == '<') {
+                return true;
+            }
+            // Marks of the byte order are negative, and the other half of a sign in UTF-16 is 0.
+            if (one > ' ') {
+                return false;
+            }
+        }
+        return false;
     }
 
     /** Reads a text, as {@link #read}; {@code name} is for messages. */
     public static Sfc parse(String name, String text) {
-        return new SfcReader(name, text).read();
+        return text.strip().startsWith("<") ? new SfcReader(PlcopenReader.read(name, text.getBytes(StandardCharsets.UTF_8))).read()
+            : new SfcReader(new Words(name, text)).read();
     }
 
     /** The net. Of two transitions that can fire, the one with the smaller {@code PRIORITY}, or else the first one, has the greater priority. */

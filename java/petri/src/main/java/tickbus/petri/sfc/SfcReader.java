@@ -33,8 +33,8 @@ final class SfcReader {
     private record Way(String name, String priority, List<Word> from, List<Word> to) {
     }
 
-    SfcReader(String file, String text) {
-        words = new Words(file, text);
+    SfcReader(Words words) {
+        this.words = words;
     }
 
     Sfc read() {

@@ -17,8 +17,13 @@ final class Words {
     private int at;
 
     Words(String file, String text) {
+        this(file, Word.all(file, text));
+    }
+
+    /** Goes through words whose last one is the end. */
+    Words(String file, List<Word> words) {
         this.file = file;
-        words = Word.all(file, text);
+        this.words = words;
     }
 
     Word next() {

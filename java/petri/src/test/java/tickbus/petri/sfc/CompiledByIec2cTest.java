@@ -111,25 +111,36 @@ class CompiledByIec2cTest {
             """);
     }
 
+    /** Beremiz made the text of the same project. */
+    @Test
+    void aProjectInPlcopenXml() throws Exception {
+        Path project = Path.of("src/test/resources/sfc/mixer.xml");
+        compare(Files.readString(project.resolveSibling("mixer.st")), Sfc.read(project));
+    }
+
     private void compare(String chart) throws Exception {
-        Path compiler = compiler();
-        Path library = compiler.resolveSibling("lib");
-        assumeTrue(Files.isRegularFile(library.resolve("ieclib.txt")), "iec2c has no library beside it");
         String program = "PROGRAM chart\n" + VARIABLES + chart + "END_PROGRAM\n";
-        Path file = Files.writeString(folder.resolve("chart.st"), program + """
+        compare(program + """
             CONFIGURATION config
               RESOURCE res ON PLC
                 TASK t(INTERVAL := T#10ms, PRIORITY := 0);
                 PROGRAM p WITH t : chart;
               END_RESOURCE
             END_CONFIGURATION
-            """);
+            """, Sfc.parse("chart.st", program));
+    }
+
+    /** Compares a text that iec2c compiles with a chart that runs here. */
+    private void compare(String text, Sfc read) throws Exception {
+        Path compiler = compiler();
+        Path library = compiler.resolveSibling("lib");
+        assumeTrue(Files.isRegularFile(library.resolve("ieclib.txt")), "iec2c has no library beside it");
+        Path file = Files.writeString(folder.resolve("chart.st"), text);
         run(compiler.toString(), "-f", "-l", "-p", "-I", library.toString(), "-T", folder.toString(), file.toString());
-        Sfc read = Sfc.read(file);
         Files.writeString(folder.resolve("main.c"), main(read));
         run("cc", "-w", "-I", folder.toString(), "-I", library.resolve("C").toString(), "-o",
             folder.resolve("main").toString(), folder.resolve("main.c").toString(), "-lm");
-        Draws random = new Draws(chart.hashCode());
+        Draws random = new Draws(text.hashCode());
         StringBuilder inputs = new StringBuilder();
         List<String> got = new ArrayList<>();
         SfcController net = read.start();

@@ -25,7 +25,8 @@ public final class Main {
     private static final int OK = 0;
     private static final int WRONG = 1;
     private static final int USAGE = 2;
-    private static final List<String> FORMATS = List.of("svg", "dot", "pnml", "tapaal", "prom", "woped", "pipe", "lola", "tina");
+    private static final List<String> FORMATS = List.of("svg", "dot", "pnml", "tapaal", "prom", "woped", "pipe", "lola", "tina", "sfc",
+        "plcopen");
     private static final String HELP = """
         usage: java -jar tickbus-petri.jar step NET [options]      go through a net step by step
                java -jar tickbus-petri.jar analyse NET [options]   what can be proven about it
@@ -44,7 +45,8 @@ public final class Main {
           --limit N          the most markings to explore (default 1000000)
           --require LIST     exit code 1 unless all of these are proven: bounded, safe, live, deadlock-free, reversible
         draw:
-          --as FORMAT        svg (default), dot, pnml, or for a tool: tapaal, prom, woped, pipe, lola, tina
+          --as FORMAT        svg (default), dot, pnml, or for a tool: tapaal, prom, woped, pipe, lola, tina;
+                             as a sequential function chart: sfc (text), plcopen (XML)
           --out FILE         into this file (default: standard output)
         all:
           --unit TIME        the unit of time in a .hpx or .net file, read or written (default 1ms)
@@ -135,14 +137,10 @@ public final class Main {
         if (!FORMATS.contains(as)) {
             throw new UsageException("--as " + as + ": expected one of " + String.join(", ", FORMATS));
         }
-        PetriNet net = NetFile.read(line, as.equals("tina"), err);
         String text = switch (as) {
-            case "svg" -> NetSvg.write(net);
-            case "dot" -> Dot.write(net);
-            case "pnml" -> Pnml.write(net);
-            case "lola" -> Lola.write(net);
-            case "tina" -> Tina.write(net, NetFile.unit(line));
-            default -> Pnml.write(net, Dialect.valueOf(as.toUpperCase(Locale.ROOT)));
+            case "sfc" -> NetFile.chart(line, err).text();
+            case "plcopen" -> NetFile.chart(line, err).plcopen();
+            default -> text(as, NetFile.read(line, as.equals("tina"), err), line);
         };
         String file = line.one("--out", null);
         if (file == null) {
@@ -152,6 +150,17 @@ public final class Main {
             out.println("wrote " + file);
         }
         return OK;
+    }
+
+    private static String text(String as, PetriNet net, CommandLine line) {
+        return switch (as) {
+            case "svg" -> NetSvg.write(net);
+            case "dot" -> Dot.write(net);
+            case "pnml" -> Pnml.write(net);
+            case "lola" -> Lola.write(net);
+            case "tina" -> Tina.write(net, NetFile.unit(line));
+            default -> Pnml.write(net, Dialect.valueOf(as.toUpperCase(Locale.ROOT)));
+        };
     }
 
     /** Writes a text to a file; an exception names the file. */

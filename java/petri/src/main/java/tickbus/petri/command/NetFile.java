@@ -78,6 +78,12 @@ final class NetFile {
         return imported.net();
     }
 
+    /** The chart of a file, with its conditions and actions; otherwise the net as one. */
+    static Sfc chart(CommandLine line, PrintStream err) throws IOException {
+        boolean isChart = format(Path.of(line.file())).equals("sfc") && line.one("--unit", null) == null && line.all("--delay").isEmpty();
+        return isChart ? Sfc.read(Path.of(line.file())) : Sfc.of(read(line, err));
+    }
+
     private static Map<String, Delay> delays(CommandLine line) {
         Map<String, Delay> delays = new HashMap<>();
         for (String one : line.all("--delay")) {

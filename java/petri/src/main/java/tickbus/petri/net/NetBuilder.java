@@ -21,6 +21,17 @@ public sealed class NetBuilder permits PlaceStep, TransitionStep {
     private final Map<String, double[]> placesAt;
     private final Map<String, double[]> transitionsAt;
     private final Map<String, double[][]> bends;
+    private final Map<String, MacroStep> macroSteps;
+
+    /**
+     * A macro step.
+     *
+     * @param steps the places of its expansion
+     * @param entry the place into which arcs to the macro step put tokens
+     * @param exit the place from which arcs from the macro step take tokens
+     */
+    private record MacroStep(List<String> steps, String entry, String exit) {
+    }
 
     private record Pending(ArcKind kind, String place, String transition, int weight) {
         String text() {
@@ -42,6 +53,7 @@ public sealed class NetBuilder permits PlaceStep, TransitionStep {
         placesAt = new HashMap<>();
         transitionsAt = new HashMap<>();
         bends = new HashMap<>();
+        macroSteps = new LinkedHashMap<>();
     }
 
     /** Continues the net of another builder. */
@@ -54,6 +66,7 @@ public sealed class NetBuilder permits PlaceStep, TransitionStep {
         placesAt = of.placesAt;
         transitionsAt = of.transitionsAt;
         bends = of.bends;
+        macroSteps = of.macroSteps;
     }
 
     /** A place without tokens. */
@@ -76,6 +89,65 @@ public sealed class NetBuilder permits PlaceStep, TransitionStep {
         checkName("transition", name, transitions);
         transitions.put(name, new Transition(transitions.size(), name, 0, Delay.NONE));
         return new TransitionStep(this, name);
+    }
+
+    /**
+     * A macro step, as in Grafcet (IEC 60848): it stands for another net, its expansion, of which this net gets a copy with the
+     * names {@code M2.E2}, {@code M2.S2} and so on. An output arc to the macro step puts its token into the entry step, an input
+     * arc takes it from the exit step, and an inhibitor arc of weight 1 needs all steps of the expansion to be empty.
+     *
+     * @param name the name of the macro step, such as {@code M2}
+     * @param expansion the net that the macro step stands for; it can have macro steps
+     * @param entry the place of the expansion that is the entry step, such as {@code E2}
+     * @param exit the place of the expansion that is the exit step, such as {@code S2}; another one than {@code entry}
+     */
+    public NetBuilder macroStep(String name, PetriNet expansion, String entry, String exit) {
+        checkName("macro step", name, macroSteps);
+        List<String> steps = expansion.places().stream().map(Place::name).toList();
+        for (String one : List.of(entry, exit)) {
+            if (!steps.contains(one)) {
+                mistakes.add("macro step " + name + ": there is no place '" + one + "' in " + expansion.name());
+            }
+        }
+        if (entry.equals(exit)) {
+            mistakes.add("macro step " + name + ": " + entry + " is entry and exit; expected two steps");
+        }
+        String prefix = name + ".";
+        for (Place one : expansion.places()) {
+            place(prefix + one.name(), one.initial());
+            places.computeIfPresent(prefix + one.name(), (key, made) -> new Place(made.index(), key, one.initial(), one.capacity(), one.delay()));
+        }
+        for (Transition one : expansion.transitions()) {
+            transition(prefix + one.name()).priority(one.priority()).delay(one.delay());
+        }
+        for (Arc arc : expansion.arcs()) {
+            arc(arc.kind(), prefix + expansion.place(arc.place()).name(), prefix + expansion.transition(arc.transition()).name(), arc.weight());
+        }
+        macroSteps.put(name, new MacroStep(steps.stream().map(one -> prefix + one).toList(), prefix + entry, prefix + exit));
+        return this;
+    }
+
+    /** The arcs that an arc to or from a macro step stands for. */
+    private List<Pending> expanded(Pending arc) {
+        MacroStep macro = macroSteps.get(arc.place);
+        if (macro == null) {
+            return List.of(arc);
+        }
+        return switch (arc.kind) {
+            case INPUT -> List.of(new Pending(arc.kind, macro.exit, arc.transition, arc.weight));
+            case OUTPUT -> List.of(new Pending(arc.kind, macro.entry, arc.transition, arc.weight));
+            case INHIBITOR -> {
+                if (arc.weight > 1) {
+                    mistakes.add(arc.text() + ": weight " + arc.weight + " at a macro step; expected 1");
+                }
+                yield macro.steps.stream().map(one -> new Pending(arc.kind, one, arc.transition, 1)).toList();
+            }
+            case TEST -> {
+                mistakes.add(arc.text() + ": a test arc at a macro step, which is active while any of its steps is; expected one of its steps, "
+                    + "such as " + macro.exit);
+                yield List.of();
+            }
+        };
     }
 
     /** An arc of any kind between nodes by name, for readers of files: a place, and a transition. */
@@ -124,7 +196,9 @@ public sealed class NetBuilder permits PlaceStep, TransitionStep {
     public PetriNet build() {
         Map<String, String> seen = new HashMap<>();
         List<Arc> made = new ArrayList<>();
-        for (Pending arc : arcs) {
+        macroSteps.keySet().stream().filter(places::containsKey)
+            .forEach(one -> mistakes.add("macro step " + one + ": there is a place of this name; expected another one"));
+        for (Pending arc : arcs.stream().flatMap(one -> expanded(one).stream()).toList()) {
             Place with = places.get(arc.place);
             Transition by = transitions.get(arc.transition);
             if (with == null) {

@@ -279,6 +279,9 @@ final class PlcopenReader {
 
     private List<Word> code(XmlElement of) {
         List<Word> all = Word.all(file, of.code());
+        if (words.size() + all.size() > Word.MOST) {
+            throw mistake(of, "more than " + Word.MOST + " words in the chart; expected fewer");
+        }
         List<Word> code = all.subList(0, all.size() - 1);
         for (Word word : code) {
             if (NOT_IN_CODE.contains(word.text())) {

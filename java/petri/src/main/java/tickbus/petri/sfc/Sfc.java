@@ -20,6 +20,7 @@ public final class Sfc {
     final List<Value> conditions;
     final List<Association> associations;
     final List<Action> actions;
+    final Source source;
 
     /**
      * An action.
@@ -30,12 +31,26 @@ public final class Sfc {
     record Action(int variable, Statement body) {
     }
 
-    Sfc(PetriNet net, List<Variable> variables, List<Value> conditions, List<Association> associations, List<Action> actions) {
+    /**
+     * The parts of the text that a run does not need, for writing.
+     *
+     * @param kind {@code PROGRAM} or {@code FUNCTION_BLOCK}
+     * @param blocks the words before each variable's block, such as {@code VAR RETAIN}
+     * @param conditions the expression of each transition
+     * @param names the name of each action
+     * @param bodies the statements of each action; empty for a variable
+     */
+    record Source(String kind, List<String> blocks, List<String> conditions, List<String> names, List<String> bodies) {
+    }
+
+    Sfc(PetriNet net, List<Variable> variables, List<Value> conditions, List<Association> associations, List<Action> actions,
+            Source source) {
         this.net = net;
         this.variables = List.copyOf(variables);
         this.conditions = List.copyOf(conditions);
         this.associations = List.copyOf(associations);
         this.actions = List.copyOf(actions);
+        this.source = source;
     }
 
     /**
@@ -74,6 +89,27 @@ public final class Sfc {
     public static Sfc parse(String name, String text) {
         return text.strip().startsWith("<") ? new SfcReader(PlcopenReader.read(name, text.getBytes(StandardCharsets.UTF_8))).read()
             : new SfcReader(new Words(name, text)).read();
+    }
+
+    /**
+     * A net as a chart, whose transitions have no condition but the net's: a delay becomes a condition on the time of the steps
+     * before the transition, a test or inhibitor arc one on the step's flag. Of conflicting transitions with one priority, the
+     * first one wins. In a scan each transition fires at most once.
+     *
+     * @throws NetException with each part of the net that a chart does not have; the chart must also be proven to be safe
+     */
+    public static Sfc of(PetriNet net) {
+        return new NetChart(net).chart();
+    }
+
+    /** The chart as IEC 61131-3 text, without comments; a program has a configuration with a task of 20 ms. */
+    public String text() {
+        return new SfcWriter(this).text();
+    }
+
+    /** The chart as a project in PLCopen XML, drawn from top to bottom, as Beremiz and OpenPLC Editor open it. */
+    public String plcopen() {
+        return new PlcopenWriter(this).text();
     }
 
     /** The net. Of two transitions that can fire, the one with the smaller {@code PRIORITY}, or else the first one, has the greater priority. */

@@ -17,6 +17,8 @@ import tickbus.petri.net.TransitionStep;
 final class SfcReader {
     private static final Set<String> TYPES = Set.of("BOOL", "SINT", "INT", "DINT", "LINT", "USINT", "UINT", "UDINT", "TIME");
     private static final String NO_PRIORITY = "";
+    private static final int LONGEST_NAME = 200;
+    private static final int MOST_NAMES_SHOWN = 20;
 
     private final Words words;
     private final List<Variable> variables = new ArrayList<>();
@@ -29,6 +31,10 @@ final class SfcReader {
     private final List<Association> associations = new ArrayList<>();
     private final List<Way> ways = new ArrayList<>();
     private final List<Value> conditions = new ArrayList<>();
+    private final List<String> blocks = new ArrayList<>();
+    private final List<String> conditionTexts = new ArrayList<>();
+    private final List<String> actionNames = new ArrayList<>();
+    private final List<String> bodies = new ArrayList<>();
 
     private record Way(String name, String priority, List<Word> from, List<Word> to) {
     }
@@ -44,8 +50,9 @@ final class SfcReader {
             }
             words.next();
         }
-        String end = "END_" + words.next().text();
-        String name = words.name("the program").written();
+        String kind = words.next().text();
+        String end = "END_" + kind;
+        String name = name("the program").written();
         while (words.look().text().startsWith("VAR")) {
             declarations(words.next());
         }
@@ -59,28 +66,33 @@ final class SfcReader {
                 case "INITIAL_STEP", "STEP" -> step();
                 case "TRANSITION" -> transition(expressions);
                 case "ACTION" -> {
-                    Word action = words.name("an action");
+                    Word action = name("an action");
                     words.expect(":");
-                    actions.set(actionIndexes.get(action.text()), new Sfc.Action(-1, expressions.statements("END_ACTION", "")));
+                    int start = words.position();
+                    int index = actionIndexes.get(action.text());
+                    actions.set(index, new Sfc.Action(-1, expressions.statements("END_ACTION", "")));
+                    bodies.set(index, words.text(start, words.position()));
                     words.expect("END_ACTION");
                 }
                 default -> throw words.mistake(word, "'" + word.written() + "'; expected STEP, TRANSITION, ACTION or " + end);
             }
         }
-        return new Sfc(net(name), variables, conditions, associations, actions);
+        return new Sfc(net(name), variables, conditions, associations, actions,
+            new Sfc.Source(kind, blocks, conditionTexts, actionNames, bodies));
     }
 
     private void declarations(Word block) {
         if (!Set.of("VAR", "VAR_INPUT", "VAR_OUTPUT").contains(block.text())) {
             throw words.mistake(block, block.written() + " is not read; expected VAR, VAR_INPUT or VAR_OUTPUT");
         }
+        StringBuilder kind = new StringBuilder(block.text());
         while (Set.of("CONSTANT", "RETAIN", "NON_RETAIN").contains(words.look().text())) {
-            words.next();
+            kind.append(' ').append(words.next().text());
         }
         while (!words.takes("END_VAR")) {
-            List<Word> names = new ArrayList<>(List.of(words.name("a variable")));
+            List<Word> names = new ArrayList<>(List.of(name("a variable")));
             while (words.takes(",")) {
-                names.add(words.name("a variable"));
+                names.add(name("a variable"));
             }
             String location = "";
             if (words.takes("AT")) {
@@ -99,6 +111,7 @@ final class SfcReader {
             boolean isInput = block.text().equals("VAR_INPUT") || location.startsWith("%I");
             for (Word name : names) {
                 add(indexes, name, variables.size());
+                blocks.add(kind.toString());
                 variables.add(new Variable(name.written(), type.text(), location, isInput, value));
             }
         }
@@ -110,10 +123,24 @@ final class SfcReader {
         return new Expressions(words, List.of(), Map.of(), Map.of()).of(kind).of().of(none);
     }
 
+    private Word name(String of) {
+        Word name = words.name(of);
+        if (name.text().length() > LONGEST_NAME) {
+            throw words.mistake(name, "a name of " + name.text().length() + " characters; expected at most " + LONGEST_NAME);
+        }
+        return name;
+    }
+
     private void add(Map<String, Integer> to, Word name, int index) {
         if (to.putIfAbsent(name.text(), index) != null) {
             throw words.mistake(name, name.written() + " is declared twice");
         }
+    }
+
+    private void add(String name, Sfc.Action action) {
+        actions.add(action);
+        actionNames.add(name);
+        bodies.add("");
     }
 
     /** The names of steps and actions. */
@@ -122,7 +149,7 @@ final class SfcReader {
             Word word = words.next();
             switch (word.text()) {
                 case "INITIAL_STEP", "STEP" -> {
-                    Word name = words.name("a step");
+                    Word name = name("a step");
                     if (word.text().startsWith("INITIAL")) {
                         if (initial >= 0) {
                             throw words.mistake(name, "a second INITIAL_STEP; expected one in a chart");
@@ -136,8 +163,9 @@ final class SfcReader {
                     stepNames.add(name);
                 }
                 case "ACTION" -> {
-                    add(actionIndexes, words.name("an action"), actions.size());
-                    actions.add(null);
+                    Word name = name("an action");
+                    add(actionIndexes, name, actions.size());
+                    add(name.written(), null);
                 }
                 case "" -> throw words.mistake(word, "the end of the file; expected " + end);
                 default -> { }
@@ -152,7 +180,7 @@ final class SfcReader {
         Word name = words.next();
         words.expect(":");
         while (!words.takes("END_STEP")) {
-            Word action = words.name("an action");
+            Word action = name("an action");
             Association.Qualifier qualifier = Association.Qualifier.N;
             long nanos = 0;
             if (words.takes("(")) {
@@ -193,12 +221,12 @@ final class SfcReader {
             throw words.mistake(name, "'" + name.written() + "' is no ACTION, and no variable of type BOOL that a program may write");
         }
         actionIndexes.put(name.text(), actions.size());
-        actions.add(new Sfc.Action(variable, null));
+        add(name.written(), new Sfc.Action(variable, null));
         return actions.size() - 1;
     }
 
     private void transition(Expressions expressions) {
-        String name = words.isNext("(") || words.isNext("FROM") ? "" : words.name("a transition").written();
+        String name = words.isNext("(") || words.isNext("FROM") ? "" : name("a transition").written();
         String priority = NO_PRIORITY;
         if (words.takes("(")) {
             words.expect("PRIORITY");
@@ -211,7 +239,9 @@ final class SfcReader {
         words.expect("TO");
         List<Word> to = stepList();
         words.expect(":=");
+        int start = words.position();
         conditions.add(expressions.of(Kind.BOOL));
+        conditionTexts.add(words.text(start, words.position()));
         words.expect(";");
         words.expect("END_TRANSITION");
         ways.add(new Way(name.isEmpty() ? text(from) + " to " + text(to) : name, priority, from, to));
@@ -224,13 +254,14 @@ final class SfcReader {
     private List<Word> stepList() {
         boolean isList = words.takes("(");
         List<Word> all = new ArrayList<>();
+        Set<String> seen = new HashSet<>();
         do {
-            Word name = words.name("a step");
+            Word name = name("a step");
             if (!steps.containsKey(name.text())) {
                 throw words.mistake(name, "there is no step '" + name.written() + "'; there are "
-                    + stepNames.stream().map(Word::written).toList());
+                    + stepNames.stream().limit(MOST_NAMES_SHOWN).map(Word::written).toList());
             }
-            if (all.stream().anyMatch(one -> one.text().equals(name.text()))) {
+            if (!seen.add(name.text())) {
                 throw words.mistake(name, "step " + name.written() + " is given twice");
             }
             all.add(name);
@@ -250,13 +281,11 @@ final class SfcReader {
         for (int rank = 0; rank < order.size(); rank++) {
             priority[order.get(rank)] = order.size() - rank;
         }
-        Set<String> taken = new HashSet<>();
+        Map<String, Integer> numbers = new HashMap<>();
         for (int i = 0; i < ways.size(); i++) {
             Way way = ways.get(i);
-            String unique = way.name;
-            for (int number = 2; !taken.add(unique); number++) {
-                unique = way.name + " (" + number + ")";
-            }
+            int number = numbers.merge(way.name, 1, Integer::sum);
+            String unique = number == 1 ? way.name : way.name + " (" + number + ")";
             TransitionStep transition = builder.transition(unique).priority(priority[i]);
             way.from.forEach(step -> transition.input(stepNames.get(steps.get(step.text())).written()));
             way.to.forEach(step -> transition.output(stepNames.get(steps.get(step.text())).written()));

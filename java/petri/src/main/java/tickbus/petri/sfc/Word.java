@@ -17,6 +17,8 @@ import tickbus.petri.net.NetException;
  * @param column from 1
  */
 record Word(String text, String written, int line, int column) {
+    /** More would fill the memory. */
+    static final int MOST = 2_000_000;
     private static final Pattern ONE = Pattern.compile(
         "(?<skip>\\s+|//[^\\n]*|\\(\\*(?s:.*?)\\*\\)|\\{[^}]*\\})"
             + "|%[A-Za-z]+[0-9.]+|(?:T|t|TIME|time)#[-0-9A-Za-z_.]+|16#[0-9A-Fa-f_]+|2#[01_]+|8#[0-7_]+|[0-9][0-9_]*(?:\\.[0-9]+)?"
@@ -54,6 +56,9 @@ record Word(String text, String written, int line, int column) {
                     + "' begins no word" + (text.startsWith("(*", at) ? "; the comment has no end" : ""));
             }
             if (matcher.group("skip") == null) {
+                if (words.size() == MOST) {
+                    throw new NetException(file, places.line, "", "column " + places.column(at) + ": more than " + MOST + " words");
+                }
                 words.add(of(matcher.group(), places.line, places.column(at)));
             }
             at = matcher.end();

@@ -2,6 +2,7 @@ package tickbus.petri.sfc;
 
 import java.math.BigDecimal;
 import java.util.List;
+import java.util.Set;
 import java.util.regex.Matcher;
 import java.util.regex.Pattern;
 import tickbus.petri.net.NetException;
@@ -46,6 +47,21 @@ final class Words {
 
     void goTo(int position) {
         at = position;
+    }
+
+    /** The text from one position up to another, without its comments. */
+    String text(int from, int to) {
+        StringBuilder text = new StringBuilder();
+        for (int i = from; i < to; i++) {
+            Word word = words.get(i);
+            if (i > from) {
+                String before = words.get(i - 1).text();
+                boolean isClose = Set.of(".", "(").contains(before) || Set.of(".", ")", ";", ",").contains(word.text());
+                text.append(words.get(i - 1).line() < word.line() ? "\n" : isClose ? "" : " ");
+            }
+            text.append(word.written());
+        }
+        return text.toString();
     }
 
     /** Takes the next word if it is this one. */

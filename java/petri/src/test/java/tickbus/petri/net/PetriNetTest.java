@@ -118,4 +118,41 @@ class PetriNetTest {
         String text = assertThrows(IllegalArgumentException.class, () -> Samples.paper().place("P9")).getMessage();
         assertTrue(text.contains("there is no place 'P9'; there are [P0, P1"), text);
     }
+
+    @Test
+    void aMacroStepIsItsExpansion() {
+        PetriNet inner = PetriNet.named("inner").place("E1").place("S1").transition("t").priority(2).delay(5).input("E1").output("S1").build();
+        PetriNet fill = PetriNet.named("fill").place("E2").place("wait").delay(7).place("S2").capacity(3)
+            .transition("t").input("E2").output("M1").transition("u").input("M1").output("wait").transition("v").input("wait").output("S2")
+            .macroStep("M1", inner, "E1", "S1").build();
+        PetriNet net = PetriNet.named("tank").place("rest", 1).place("free", 1)
+            .macroStep("M2", fill, "E2", "S2")
+            .transition("start").input("rest").output("M2")
+            .transition("done").input("M2").output("rest")
+            .transition("alone").input("free").output("free").inhibitor("M2", 1)
+            .build();
+        PetriNet same = PetriNet.named("tank").place("rest", 1).place("free", 1)
+            .place("M2.E2").place("M2.wait").delay(7).place("M2.S2").capacity(3).place("M2.M1.E1").place("M2.M1.S1")
+            .transition("M2.t").input("M2.E2").output("M2.M1.E1").transition("M2.u").input("M2.M1.S1").output("M2.wait")
+            .transition("M2.v").input("M2.wait").output("M2.S2")
+            .transition("M2.M1.t").priority(2).delay(5).input("M2.M1.E1").output("M2.M1.S1")
+            .transition("start").input("rest").output("M2.E2").transition("done").input("M2.S2").output("rest")
+            .transition("alone").input("free").output("free").inhibitor("M2.E2", 1).inhibitor("M2.wait", 1).inhibitor("M2.S2", 1)
+            .inhibitor("M2.M1.E1", 1).inhibitor("M2.M1.S1", 1).build();
+        assertTrue(net.isSameAs(same), net + " " + net.arcs());
+    }
+
+    @Test
+    void mistakesOfMacroStepsAreNamed() {
+        PetriNet fill = PetriNet.named("fill").place("E").place("S").transition("t").input("E").output("S").build();
+        NetException wrong = assertThrows(NetException.class, () -> PetriNet.named("n").place("M")
+            .macroStep("M", fill, "E", "X").macroStep("K", fill, "E", "E")
+            .transition("a").test("K", 1).transition("b").inhibitor("K", 2).build());
+        assertEquals("""
+            net n: macro step M: there is no place 'X' in fill
+            macro step K: E is entry and exit; expected two steps
+            macro step M: there is a place of this name; expected another one
+            test arc K -> a: a test arc at a macro step, which is active while any of its steps is; expected one of its steps, such as K.E
+            inhibitor arc K -> b: weight 2 at a macro step; expected 1""", wrong.getMessage());
+    }
 }

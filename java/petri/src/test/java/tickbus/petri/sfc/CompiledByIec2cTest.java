@@ -13,8 +13,11 @@ import java.util.ArrayList;
 import java.util.List;
 import java.util.concurrent.TimeUnit;
 import java.util.stream.Collectors;
+import java.util.stream.Stream;
 import org.junit.jupiter.api.Test;
 import org.junit.jupiter.api.io.TempDir;
+import tickbus.petri.net.PetriNet;
+import tickbus.petri.net.Place;
 import tickbus.petri.run.Draws;
 
 /** Charts run as nets beside the same charts compiled by iec2c, the compiler of OpenPLC and Beremiz: the outputs of each scan are equal. */
@@ -118,6 +121,19 @@ class CompiledByIec2cTest {
         compare(Files.readString(project.resolveSibling("mixer.st")), Sfc.read(project));
     }
 
+    /** The text that is written of a chart runs as the chart did, and that of a net as the net. */
+    @Test
+    void whatIsWrittenOfAChart() throws Exception {
+        Sfc mixer = Sfc.read(Path.of("src/test/resources/sfc/mixer.xml"));
+        compare(mixer.text(), mixer);
+    }
+
+    @Test
+    void whatIsWrittenOfANet() throws Exception {
+        Sfc chart = Sfc.of(WrittenTest.PRESS);
+        compare(chart.text(), chart);
+    }
+
     private void compare(String chart) throws Exception {
         String program = "PROGRAM chart\n" + VARIABLES + chart + "END_PROGRAM\n";
         compare(program + """
@@ -137,7 +153,7 @@ class CompiledByIec2cTest {
         assumeTrue(Files.isRegularFile(library.resolve("ieclib.txt")), "iec2c has no library beside it");
         Path file = Files.writeString(folder.resolve("chart.st"), text);
         run(compiler.toString(), "-f", "-l", "-p", "-I", library.toString(), "-T", folder.toString(), file.toString());
-        Files.writeString(folder.resolve("main.c"), main(read));
+        Files.writeString(folder.resolve("main.c"), main(read, Sfc.parse("chart.st", text).net()));
         run("cc", "-w", "-I", folder.toString(), "-I", library.resolve("C").toString(), "-o",
             folder.resolve("main").toString(), folder.resolve("main.c").toString(), "-lm");
         Draws random = new Draws(text.hashCode());
@@ -154,11 +170,15 @@ class CompiledByIec2cTest {
             inputs.append(now);
             for (int i = 0; i < 3; i++) {
                 inputs.append(' ').append(values[i]);
-                net.set(names.substring(i, i + 1), values[i]);
+                if (!read.variables().isEmpty()) {
+                    net.set(names.substring(i, i + 1), values[i]);
+                }
             }
             inputs.append('\n');
             fired += net.scan(now);
-            got.add(String.join(" ", read.variables().stream().filter(one -> !one.isInput()).map(one -> "" + net.get(one.name())).toList()));
+            got.add(String.join(" ", Stream.concat(
+                read.variables().stream().filter(one -> !one.isInput()).map(one -> "" + net.get(one.name())),
+                read.net().places().stream().map(one -> "" + net.coordinator().tokens(one.index()))).toList()));
         }
         Files.writeString(folder.resolve("inputs"), inputs);
         List<String> wanted = run(folder.resolve("main").toString(), folder.resolve("inputs").toString()).lines().toList();
@@ -170,11 +190,17 @@ class CompiledByIec2cTest {
         assertTrue(got.stream().distinct().count() > 4, "the outputs hardly changed");
     }
 
-    private static String main(Sfc chart) {
+    /** The main program for the steps of {@code compiled}, which can have another order than those of the chart. */
+    private static String main(Sfc chart, PetriNet compiled) {
         StringBuilder prints = new StringBuilder();
+        StringBuilder inputs = new StringBuilder();
         for (Variable one : chart.variables()) {
             String name = "_" + one.location().replace("%", "_").replace('.', '_') + "_";
             prints.append(one.isInput() ? "" : "    printf(\"%d \", (int)" + name + ");\n");
+            inputs.append(one.isInput() ? "    " + name + " = " + one.name() + ";\n" : "");
+        }
+        for (Place step : chart.net().places()) {
+            prints.append("    printf(\"%d \", (int)p.__step_list[").append(compiled.place(step.name()).index()).append("].X.value);\n");
         }
         return """
             #include <stdio.h>
@@ -194,9 +220,7 @@ class CompiledByIec2cTest {
                 while (fscanf(in, "%lld %d %d %d", &now, &a, &b, &c) == 4) {
                     __CURRENT_TIME.tv_sec = now / 1000000000;
                     __CURRENT_TIME.tv_nsec = now % 1000000000;
-                    __IX0_0_ = a;
-                    __IX0_1_ = b;
-                    __IX0_2_ = c;
+            """ + inputs + """
                     CHART_body__(&p);
             """ + prints + """
                     printf("\\n");

@@ -4,6 +4,7 @@ import static org.junit.jupiter.api.Assertions.assertEquals;
 import static org.junit.jupiter.api.Assertions.assertThrows;
 import static org.junit.jupiter.api.Assertions.assertTrue;
 
+import java.io.RandomAccessFile;
 import java.nio.file.Files;
 import java.nio.file.Path;
 import org.junit.jupiter.api.Test;
@@ -128,6 +129,18 @@ class SfcTest {
             "tank.st:5: column 16: full is an input; expected a variable that a program may write");
         assertMistake("STEP fill:", "ACTION act: IF full THEN n := 1; END_ACTION STEP fill:",
             "tank.st:5: column 36: 'END_ACTION'; expected an assignment to a variable, or IF; nothing else is read in actions");
+    }
+
+    @Test
+    void largeFilesAndLongNamesAreRefused(@TempDir Path folder) throws Exception {
+        assertMistake("STEP fill", "STEP f" + "i".repeat(200), "tank.st:5: column 8: a name of 201 characters; expected at most 200");
+        assertMistake("valve(N);", ";".repeat(2_000_000), "tank.st:5: column 1999983: more than 2000000 words");
+        Path file = folder.resolve("large.xml");
+        try (RandomAccessFile large = new RandomAccessFile(file.toFile(), "rw")) {
+            large.setLength((16L << 20) + 1);
+        }
+        assertEquals(file + ": 16777217 bytes; expected at most 16777216",
+            assertThrows(NetException.class, () -> Sfc.read(file)).getMessage());
     }
 
     private static void assertMistake(String right, String wrong, String message) {

@@ -105,7 +105,8 @@ impl SilKit {
         let early = |reason| ended(&self.stop, &mapping.client, reason);
         let participant = self.connect().map_err(early)?;
         news(&format!(
-            "the participant \"{}\" has joined; the simulation is not complete yet",
+            "the participant \"{}\" has joined; the simulation begins when all participants that the system controller \
+             names have joined",
             mapping.name
         ));
         let mut joined = self.join(participant, news).map_err(early)?;

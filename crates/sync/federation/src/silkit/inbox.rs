@@ -12,6 +12,9 @@ use super::scalar;
 /// How often a waiting thread looks whether it was stopped.
 const LOOK: Duration = Duration::from_millis(50);
 
+/// How long to wait for the name of the participant that stops the simulation.
+const NAMING: Nanos = Nanos::from_millis(200);
+
 /// The states of a participant that matter, and of the whole simulation: `SilKit_ParticipantState`, `SilKit_SystemState`.
 mod states {
     pub(super) const RUNNING: i16 = 50;
@@ -66,8 +69,10 @@ struct State {
     slots: Vec<Slot>,
     /// The participants that pause, with their reasons.
     paused: BTreeMap<String, String>,
-    /// The participant that stopped first, with its reason.
+    /// The participant that stopped the simulation, with its reason.
     stopped: Option<(String, String)>,
+    /// The simulation stops.
+    is_stopping: bool,
     /// Why the simulation has ended.
     ended: Option<String>,
 }
@@ -85,6 +90,7 @@ impl Inbox {
                 slots,
                 paused: BTreeMap::new(),
                 stopped: None,
+                is_stopping: false,
                 ended: None,
             }),
             changed: Condvar::new(),
@@ -145,7 +151,8 @@ impl Inbox {
             states::RUNNING => {
                 state.paused.remove(name);
             }
-            states::STOPPING if !is_own => {
+            // All others follow the one that stops, and their states may be heard first.
+            states::STOPPING if !is_own && !reason.starts_with("Received new system state") => {
                 let first = || (name.to_owned(), reason.to_owned());
                 state.stopped.get_or_insert_with(first);
             }
@@ -178,14 +185,8 @@ impl Inbox {
         self.change(|state| {
             let told = match code {
                 states::STOPPING | states::STOPPED | states::SHUTTING_DOWN | states::SHUTDOWN => {
-                    match &state.stopped {
-                        Some((name, reason)) => {
-                            format!(
-                                "the participant \"{name}\" has stopped the simulation: {reason}"
-                            )
-                        }
-                        None => "the simulation has stopped".to_owned(),
-                    }
+                    state.is_stopping = true;
+                    return;
                 }
                 states::ERROR => {
                     "the simulation is in its error state; start it again as a whole".to_owned()
@@ -248,7 +249,7 @@ impl Inbox {
     /// True if the simulation ends without us: there is no one to report an error to.
     pub(super) fn has_stopped(&self) -> bool {
         let state = self.lock();
-        state.is_shut || state.stopped.is_some()
+        state.is_shut || state.is_stopping
     }
 
     /// The topics that nothing has come from.
@@ -273,10 +274,24 @@ impl Inbox {
     ) -> Result<T, String> {
         let mut end = limit.map(|limit| clock.now() + limit);
         let mut is_paused = false;
+        let mut name_by = None;
         let mut state = self.lock();
         loop {
             if let Some(ended) = &state.ended {
                 return Err(ended.clone());
+            }
+            let now = clock.now();
+            if let (Some((name, reason)), true) = (&state.stopped, state.is_stopping) {
+                return Err(format!(
+                    "the participant \"{name}\" has stopped the simulation: {reason}"
+                ));
+            }
+            if state.is_stopping {
+                if now >= *name_by.get_or_insert(now + NAMING) {
+                    return Err("the simulation has stopped".to_owned());
+                }
+                state = self.sleep(state);
+                continue;
             }
             if let Some(taken) = take(&mut state) {
                 if is_paused {
@@ -287,7 +302,6 @@ impl Inbox {
             if stop.is_stopped() {
                 return Err("it was stopped".to_owned());
             }
-            let now = clock.now();
             if let Some((name, reason)) = state.paused.first_key_value() {
                 end = limit.map(|limit| now + limit);
                 if !std::mem::replace(&mut is_paused, true) {
@@ -372,8 +386,10 @@ mod tests {
             "{told_died}"
         );
         let stops = |inbox: &Inbox| {
-            inbox.participant("tank", states::STOPPING, "enough");
+            let follows = "Received new system state: Stopping";
+            inbox.participant("controller", states::STOPPING, follows);
             inbox.system(states::STOPPING);
+            inbox.participant("tank", states::STOPPING, "enough");
         };
         let expected = "the participant \"tank\" has stopped the simulation: enough";
         assert_eq!(told(&stops, long), expected);

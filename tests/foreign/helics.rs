@@ -158,12 +158,17 @@ fn end_of(tank: Child) -> String {
     String::from_utf8_lossy(&output.stdout).trim().to_owned()
 }
 
-/// `tickbus sync join helics` with a mapping.
-fn join(mapping: &str, server: &Address, arguments: &[&str]) -> (Child, tempfile::NamedTempFile) {
+/// `tickbus sync join ENGINE` with a mapping.
+pub(crate) fn join(
+    engine: &str,
+    mapping: &str,
+    server: &Address,
+    arguments: &[&str],
+) -> (Child, tempfile::NamedTempFile) {
     let file = tempfile::NamedTempFile::new().expect("a temporary file");
     std::fs::write(file.path(), mapping).expect("it can be written");
     let child = Command::new(env!("CARGO_BIN_EXE_tickbus"))
-        .args(["sync", "join", "helics"])
+        .args(["sync", "join", engine])
         .arg(file.path())
         .args(["--server", &server.to_string()])
         .args(arguments)
@@ -196,6 +201,7 @@ fn run(steps: u64, kind: &str) -> Result<(Result<Outcome, Ended>, String, String
     let library = library.to_str().expect("text");
     let mapping = MAPPING.replace("{port}", &port);
     let (child, _file) = join(
+        "helics",
         &mapping,
         &address,
         &["--library", library, "--timeout", "20s"],
@@ -287,6 +293,7 @@ fn missing() -> Result<(), Absent> {
     let nowhere = Address::local(1);
     let mapping = MAPPING.replace("{port}", "1");
     let (child, _file) = join(
+        "helics",
         &mapping,
         &nowhere,
         &["--library", library, "--timeout", "1s"],
@@ -305,7 +312,7 @@ fn missing() -> Result<(), Absent> {
         ("libnowhere.so", "it cannot be loaded"),
         ("libc.so.6", "it does not export helics"),
     ] {
-        let (child, _file) = join(&mapping, &nowhere, &["--library", other]);
+        let (child, _file) = join("helics", &mapping, &nowhere, &["--library", other]);
         let output = child.wait_with_output().expect("it ends");
         assert_eq!(output.status.code(), Some(1));
         let printed = String::from_utf8_lossy(&output.stderr).into_owned();

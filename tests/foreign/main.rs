@@ -38,6 +38,7 @@ mod pty;
 mod s7;
 mod schema;
 mod second_ivi;
+mod silkit;
 mod st;
 mod vcd;
 
@@ -69,6 +70,7 @@ fn main() -> ExitCode {
         ("page", page::TESTS),
         ("gateway", gateway::TESTS),
         ("helics", helics::TESTS),
+        ("silkit", silkit::TESTS),
         ("st", st::TESTS),
         ("vcd", vcd::TESTS),
         ("plc", plc::TESTS),

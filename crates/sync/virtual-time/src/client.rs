@@ -324,7 +324,11 @@ impl Connection {
         let frame = frame.map_err(|ended| Ended { steps, ..ended })?;
         match self.client.receive(frame) {
             Ok(Some(asked)) => Ok(Heard::Asked(asked)),
-            Ok(None) => Ok(self.client.state.take().map_or(Heard::Waiting, Heard::State)),
+            Ok(None) => Ok(self
+                .client
+                .state
+                .take()
+                .map_or(Heard::Waiting, Heard::State)),
             Err(ended) => {
                 self.give_up(&ended.reason);
                 Err(ended)

@@ -89,9 +89,7 @@ impl SavedRun {
 
     /// The names of the clients, in their order.
     pub fn clients(&self) -> impl ExactSizeIterator<Item = &str> {
-        self.clients
-            .iter()
-            .map(|client| &*client.declaration.name)
+        self.clients.iter().map(|client| &*client.declaration.name)
     }
 
     /// Checks that a client is the one that it was, or returns the difference.

@@ -134,7 +134,10 @@ impl Server<'_> {
             };
         }
         if let Some(seat) = self.saving.awaited() {
-            return format!("\"{}\" to save its state", shown(self.name(seat).unwrap_or_default()));
+            return format!(
+                "\"{}\" to save its state",
+                shown(self.name(seat).unwrap_or_default())
+            );
         }
         let mut owing = (barrier.owing()).map(|client| shown(&barrier.declaration(client).name));
         let named: Vec<String> = (owing.by_ref().take(MOST_NAMED))

@@ -197,11 +197,13 @@ impl Server<'_> {
         let memory = self.rejoining.memory.as_ref();
         let clients = 0..barrier.members().clients.len();
         if memory.is_none() {
-            let stateless = clients.clone().find_map(|at| match collecting.states.get(&at) {
-                Some(Ok(_)) => None,
-                Some(Err(reason)) => Some((at, &**reason)),
-                None => Some((at, "it was not asked or has not answered")),
-            });
+            let stateless = clients
+                .clone()
+                .find_map(|at| match collecting.states.get(&at) {
+                    Some(Ok(_)) => None,
+                    Some(Err(reason)) => Some((at, &**reason)),
+                    None => Some((at, "it was not asked or has not answered")),
+                });
             if let Some((at, reason)) = stateless {
                 let name = &barrier.declaration(at).name;
                 self.saving.saved = Some(Err(format!(

@@ -132,7 +132,7 @@ proptest! {
         match from_server(content(&out)) {
             Ok(FromServer::Step { step: read, reads: slots }) => {
                 prop_assert_eq!(read, step);
-                prop_assert_eq!(slots.iter().collect::<Vec<_>>(), reads);
+                prop_assert_eq!(slots.iter().collect::<Vec<_>>(), reads.clone());
             }
             other => prop_assert!(false, "{:?}", other),
         }
@@ -146,6 +146,19 @@ proptest! {
         out.clear();
         to_client(&mut out, &ToClient::Waiting(&whom));
         prop_assert_eq!(from_server(content(&out)), Ok(FromServer::Waiting(&whom)));
+        out.clear();
+        to_client(&mut out, &ToClient::Save(sequence));
+        prop_assert_eq!(from_server(content(&out)), Ok(FromServer::Save(sequence)));
+        out.clear();
+        let state = whom.as_bytes();
+        to_client(&mut out, &ToClient::Restore { sequence, writes: &reads, state });
+        match from_server(content(&out)) {
+            Ok(FromServer::Restore { sequence: read, writes, state: bytes }) => {
+                prop_assert_eq!((read, bytes), (sequence, state));
+                prop_assert_eq!(writes.iter().collect::<Vec<_>>(), reads);
+            }
+            other => prop_assert!(false, "{:?}", other),
+        }
     }
 
     #[test]
@@ -163,6 +176,7 @@ proptest! {
             Ok(FromClient::GiveUp(reason)) => give_up(&mut out, reason),
             Ok(FromClient::At { token, address }) => at(&mut out, token, address),
             Ok(FromClient::Met { token, reason }) => met(&mut out, token, reason),
+            Ok(FromClient::Saved { sequence, state }) => saved(&mut out, sequence, state),
             // Joins of version 1 can be read, but not written.
             Ok(FromClient::Join { .. }) | Err(_) => return Ok(()),
         }
@@ -233,7 +247,7 @@ fn another_version_is_refused_by_its_number() {
     let told = from_client(&out[HEADER..]).expect_err("another version");
     assert_eq!(
         told,
-        "speaks version 7 of the format, and this server versions 1 to 3"
+        "speaks version 7 of the format, and this server versions 1 to 4"
     );
 }
 

@@ -236,7 +236,7 @@ fn pymodbus_reads_files() -> Result<(), Absent> {
          assert client.read_exception_status().status == 165\n\
          assert client.diag_query_data(b'\\x12\\x34').message == b'\\x12\\x34'\n\
          assert client.diag_read_bus_exception_error_count().message == 5\n\
-         assert client.diag_get_comm_event_counter().count == 8\n",
+         assert client.diag_get_comm_event_counter().count == 9\n",
         &address.port().to_string(),
     ]);
     machine.until_the_end_of(python, Machine::tick);

@@ -77,6 +77,7 @@ fn pymodbus_has_roles() -> Result<(), Absent> {
          from pymodbus.exceptions import ModbusException\n\
          def client(own, version=None):\n\
          \x20   secured = ssl.create_default_context(cafile='ca.pem')\n\
+         \x20   secured.check_hostname = False\n\
          \x20   if version: secured.maximum_version = version\n\
          \x20   if own: secured.load_cert_chain(f'{own}.pem', f'{own}.key')\n\
          \x20   made = ModbusTlsClient('127.0.0.1', port=int(sys.argv[1]), sslctx=secured, retries=0, timeout=5)\n\

@@ -95,6 +95,8 @@ def diagnostics(client):
     check("events", (counter.isError(), counter.count), (False, 7))
     # Neither has an answer: the unit only listens, and a restart ends that.
     client.diag_force_listen_only(no_response_expected=True)
+    # Only silence ends a telegram of RTU.
+    time.sleep(0.3)
     client.diag_restart_communication(0, no_response_expected=True)
     time.sleep(0.3)
     check("it answers again", client.read_coils(0, count=1).isError(), False)
@@ -125,8 +127,9 @@ def main():
         if sys.argv[1] == "rtu":
             client = ModbusSerialClient(sys.argv[2], baudrate=115200, parity="N", stopbits=1, retries=0)
         elif sys.argv[1] == "ascii":
+            # A pseudo-terminal has no characters of seven bits, and no parity.
             client = ModbusSerialClient(
-                sys.argv[2], framer=FramerType.ASCII, baudrate=115200, bytesize=7, parity="E", retries=0)
+                sys.argv[2], framer=FramerType.ASCII, baudrate=115200, retries=0)
         else:
             client = ModbusTcpClient(sys.argv[2], port=int(sys.argv[3]), framer=FramerType.RTU, retries=0)
         check("open", client.connect(), True)

@@ -36,9 +36,9 @@ async def main():
         server = ModbusTlsServer(
             context, identity=identity, sslctx=secured, address=(sys.argv[2], int(sys.argv[3])))
     elif sys.argv[1] == "ascii":
+        # A pseudo-terminal has no characters of seven bits, and no parity.
         server = ModbusSerialServer(
-            context, identity=identity, framer=FramerType.ASCII, port=sys.argv[2], baudrate=115200, bytesize=7,
-            parity="E")
+            context, identity=identity, framer=FramerType.ASCII, port=sys.argv[2], baudrate=115200)
     elif sys.argv[1] != "rtu":
         framer = FramerType.SOCKET if sys.argv[1] == "tcp" else FramerType.RTU
         server = ModbusTcpServer(

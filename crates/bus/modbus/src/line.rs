@@ -151,13 +151,13 @@ impl Line {
                     "\"ascii\" is a framing for serial ports",
                     "name the serial port, such as device = \"/dev/ttyUSB0\", or write \"rtu\", \"tcp\" or \"udp\"",
                 );
-                return None;
             }
             let framed = |address| {
                 Some(match framing? {
                     Framing::Rtu => Self::RtuOverTcp(address),
                     Framing::Udp => Self::Udp(address),
-                    Framing::Tcp | Framing::Ascii => Self::Tcp(address),
+                    Framing::Tcp => Self::Tcp(address),
+                    Framing::Ascii => return None,
                 })
             };
             let Some(value) = stated else {

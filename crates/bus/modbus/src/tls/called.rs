@@ -19,6 +19,9 @@ pub(crate) struct TlsCaller<'a, C> {
     /// The time by which the peer has to be known.
     limit: Nanos,
     peer: String,
+    /// True if the peer has sent anything within TLS. With TLS 1.3 it judges the certificate of this end after this end has
+    /// judged its own.
+    has_answered: bool,
 }
 
 impl<'a, C: Caller> TlsCaller<'a, C> {
@@ -38,6 +41,7 @@ impl<'a, C: Caller> TlsCaller<'a, C> {
             out: Vec::new(),
             limit: now + timeout,
             peer,
+            has_answered: false,
         };
         caller.flush();
         caller
@@ -77,6 +81,7 @@ impl<C: Caller> Caller for TlsCaller<'_, C> {
             })?;
             let mut plain = vec![0; state.plaintext_bytes_to_read()];
             if self.connection.reader().read_exact(&mut plain).is_ok() && !plain.is_empty() {
+                self.has_answered = true;
                 self.inner.hear(now, &plain, port)?;
             }
             if matches!(read, Ok(0) | Err(_)) {
@@ -125,23 +130,24 @@ impl<C: Caller> Caller for TlsCaller<'_, C> {
     }
 
     fn left(&mut self) -> BusError {
-        if self.connection.is_handshaking() {
-            return BusError::Refused(format!(
-                "{} closed the connection before TLS was agreed; let it trust the authority of certificate_file",
-                self.peer
-            ));
+        if self.has_answered {
+            return self.inner.left();
         }
-        self.inner.left()
+        BusError::Refused(format!(
+            "{} closed the connection before its first answer; let it trust the authority of certificate_file, and see \
+             its log",
+            self.peer
+        ))
     }
 
     fn broke(&mut self, error: &io::Error) -> BusError {
-        if self.connection.is_handshaking() {
-            return BusError::Refused(format!(
-                "{} broke the connection before TLS was agreed ({error}); let it trust the authority of \
-                 certificate_file",
-                self.peer
-            ));
+        if self.has_answered {
+            return self.inner.broke(error);
         }
-        self.inner.broke(error)
+        BusError::Refused(format!(
+            "{} broke the connection before its first answer ({error}); let it trust the authority of \
+             certificate_file, and see its log",
+            self.peer
+        ))
     }
 }

@@ -70,6 +70,10 @@ pub(crate) const TESTS: &[(&str, Test)] = &[
         places::has_an_address_space,
     ),
     (
+        "asyncua_reads_and_writes_arrays_and_structures_whose_parts_are_signals",
+        places::has_arrays_and_structures,
+    ),
+    (
         "each_station_has_an_age_of_its_own_and_what_was_just_written_is_good",
         served::ages_apart,
     ),

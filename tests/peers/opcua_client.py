@@ -17,10 +17,14 @@ has a session, or "refused WHY", then obeys a line of JSON from stdin at a time,
     {"timed": node}                  {"millis"}: how long a Read took
     {"call": [object, method]}       {"status"}
     {"compare": file, "namespace": uri}  {"nodes", "differ": [texts]}: asyncua's own import of the file beside the server
+    {"structure": node, "set": {member: value}}  {"value", "status"}: a structure as JSON, by the server's definitions;
+                                     with "set" it is written with these members
+    {"range": [node, range, type, values]}   {"status"} of a Write with an IndexRange; null values read: {"value"}
     {"stop": true}                   and at the end of stdin
 """
 
 import asyncio
+import dataclasses
 import json
 import logging
 import socket
@@ -119,7 +123,7 @@ async def lines():
 
 
 async def serve(client):
-    changes, subscription = Changes(), None
+    changes, subscription, structures = Changes(), None, False
 
     def identifier(name):
         return ua.NodeId.from_string(name) if name.startswith("ns=") else ua.NodeId(name, 2)
@@ -207,6 +211,35 @@ async def serve(client):
                 answer["status"] = type(error).__name__
         if "compare" in line:
             answer = await compare(client, line["compare"], line["namespace"])
+        if "structure" in line:
+            if not structures:
+                await client.load_data_type_definitions()
+                structures = True
+            one = node(line["structure"])
+            value = (await one.read_data_value(raise_on_bad_status=False)).Value.Value
+            if value is None:
+                value = ua.extension_objects_by_datatype[await one.read_data_type()]()
+            for path, new in line.get("set", {}).items():
+                *way, last = path.split(".")
+                inner = value
+                for name in way:
+                    inner = getattr(inner, name)
+                setattr(inner, last, new)
+            if "set" in line:
+                wrote = await client.uaclient.write_attributes([one.nodeid], [ua.DataValue(value)])
+                answer["status"] = wrote[0].name
+            answer["value"] = dataclasses.asdict(value)
+        if "range" in line:
+            name, part, kind, values = line["range"]
+            if values is None:
+                wanted = ua.ReadValueId(identifier(name), ua.AttributeIds.Value, part)
+                asked = ua.ReadParameters(NodesToRead=[wanted])
+                answer["value"] = (await client.uaclient.read(asked))[0].Value.Value
+            else:
+                value = ua.Variant(values, getattr(ua.VariantType, kind))
+                one = ua.WriteValue(identifier(name), ua.AttributeIds.Value, part, ua.DataValue(value))
+                wrote = await client.uaclient.write(ua.WriteParameters(NodesToWrite=[one]))
+                answer["status"] = wrote[0].name
         if "timed" in line:
             begin = time.monotonic()
             await client.uaclient.read_attributes([identifier(line["timed"])], ua.AttributeIds.Value)

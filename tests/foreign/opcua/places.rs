@@ -249,3 +249,149 @@ pub(super) fn has_an_address_space() -> Result<(), Absent> {
     assert_eq!(stop["status"], "BadNotImplemented");
     Ok(())
 }
+
+/// The signals in the variables of tests/peers/axes.NodeSet2.xml.
+const AXES: &str = r#"
+[fieldbus.at]
+"force 0"   = "ns=2;i=6001[0]"
+"force 2"   = "ns=2;i=6001[2]"
+"set 1"     = "ns=2;s=Axes.Setpoints[1]"
+"set 2"     = "ns=2;s=Axes.Setpoints[2]"
+"on"        = "ns=2;i=6003.Enabled"
+"x"         = "ns=2;i=6003.Place.X"
+"speed 1"   = "ns=2;i=6003.Speeds[1]"
+"mode"      = "ns=2;i=6003.Mode"
+"target on" = "nsu=http://acme.example/axes/;i=6004.Enabled"
+"target y"  = "nsu=http://acme.example/axes/;i=6004.Place.Y"
+
+[[signal]]
+name    = "force 0"
+address = "%ID0"
+type    = "REAL"
+
+[[signal]]
+name    = "force 2"
+address = "%ID4"
+type    = "REAL"
+
+[[signal]]
+name    = "on"
+address = "%IX8.0"
+
+[[signal]]
+name    = "x"
+address = "%ID12"
+type    = "REAL"
+
+[[signal]]
+name    = "speed 1"
+address = "%IW16"
+type    = "INT"
+
+[[signal]]
+name    = "mode"
+address = "%ID20"
+type    = "DINT"
+
+[[signal]]
+name    = "set 1"
+address = "%QW0"
+type    = "INT"
+
+[[signal]]
+name    = "set 2"
+address = "%QW2"
+type    = "INT"
+
+[[signal]]
+name    = "target on"
+address = "%QX4.0"
+
+[[signal]]
+name    = "target y"
+address = "%QD8"
+type    = "REAL"
+"#;
+
+pub(super) fn has_arrays_and_structures() -> Result<(), Absent> {
+    let model = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/peers/axes.NodeSet2.xml");
+    let keys = format!(
+        "address = \"127.0.0.1:0\"\nsecurity = \"None\"\nanonymous = true\ncycle = \"5ms\"\nnodeset = {model:?}\n"
+    );
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut device = Device::open_with(folder, "opcua-server", &keys, AXES);
+    let url = format!("opc.tcp://{}", device.address());
+    let mut client = Peer::ready("opcua_client.py", &json!({"url": url}))?;
+
+    for (signal, value) in [
+        ("force 0", 1.5),
+        ("force 2", 2.5),
+        ("on", 1.0),
+        ("x", 4.25),
+        ("speed 1", 7.0),
+        ("mode", 1.0),
+    ] {
+        device.end.set(signal, value);
+    }
+    device.end.tick();
+    let forces = client.ask(&json!({"read": "ns=2;i=6001"}));
+    assert_eq!(
+        (&forces["value"], &forces["type"], &forces["status"]),
+        (&json!([1.5, 0.0, 2.5]), &json!("Float"), &json!("Good"))
+    );
+    let part = client.ask(&json!({"range": ["ns=2;i=6001", "1:2", "Float", null]}));
+    assert_eq!(part["value"], json!([0.0, 2.5]));
+    let actual = client.ask(&json!({"structure": "ns=2;i=6003"}));
+    assert_eq!(
+        actual["value"],
+        json!({
+            "Mode": 1, "Enabled": true, "Name": null, "Place": {"X": 4.25, "Y": 0.0}, "Speeds": [0, 7, 0]
+        })
+    );
+    client.ask(&json!({"subscribe": [["ns=2;i=6001"], 10, 1]}));
+    device.end.set("force 0", 3.5);
+    device.end.set("force 2", 4.5);
+    device.end.tick();
+    device.until("the change", |_| {
+        let told = client.ask(&json!({"changes": "ns=2;i=6001"}));
+        let told = told["values"].as_array().expect("a list").clone();
+        told.contains(&json!([3.5, 0.0, 4.5]))
+    });
+
+    let write = |client: &mut Peer, values: &serde_json::Value| {
+        let write = json!({"write": {"ns=2;s=Axes.Setpoints": ["Int16", values]}});
+        client.ask(&write)["statuses"][0].take()
+    };
+    assert_eq!(write(&mut client, &json!([1, 22, 33, 4])), "Good");
+    device.until("both elements", |end| {
+        (end.get("set 1"), end.get("set 2")) == (22.0, 33.0)
+    });
+    assert_eq!(write(&mut client, &json!([1, 2, 3])), "BadTypeMismatch");
+    let range = |client: &mut Peer, part: &str, values: &serde_json::Value| {
+        let range = json!({"range": ["ns=2;s=Axes.Setpoints", part, "Int16", values]});
+        client.ask(&range)["status"].take()
+    };
+    assert_eq!(range(&mut client, "2:3", &json!([44, 55])), "Good");
+    device.until("one of them", |end| {
+        (end.get("set 1"), end.get("set 2")) == (22.0, 44.0)
+    });
+    assert_eq!(
+        range(&mut client, "3:4", &json!([1, 2])),
+        "BadIndexRangeNoData"
+    );
+    let all = client.ask(&json!({"read": "ns=2;s=Axes.Setpoints"}));
+    assert_eq!(all["value"], json!([1, 22, 44, 55]));
+    assert_eq!(
+        client.ask(&json!({"write": {"ns=2;i=6001": ["Float", [1.0, 2.0, 3.0]]}}))["statuses"][0],
+        "BadUserAccessDenied"
+    );
+
+    let target = json!({"structure": "ns=2;i=6004", "set": {"Enabled": true, "Place.Y": 2.5, "Name": "A", "Speeds": [1, 2, 3]}});
+    assert_eq!(client.ask(&target)["status"], "Good");
+    device.until("both members", |end| {
+        (end.get("target on"), end.get("target y")) == (1.0, 2.5)
+    });
+    let target = client.ask(&json!({"structure": "ns=2;i=6004"}));
+    assert_eq!(target["value"]["Name"], "A");
+    Ok(())
+}

@@ -7,7 +7,7 @@ use tickbus_fieldbus::At;
 use tickbus_image::signal::SignalTable;
 
 use super::namespaces::{FIRST, LAST, UA};
-use super::{Identifier, Namespace, Node, NodeName, ServerOptions};
+use super::{Identifier, Namespace, Node, NodeName, ServerOptions, member};
 
 /// The URI of the nodes that tickbus itself adds.
 pub(crate) const OWN: &str = "urn:tickbus:signals";
@@ -26,7 +26,8 @@ impl ServerOptions {
     pub fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {
         let mut placed = Vec::new();
         for line in lines {
-            let node: NodeName = match line.text.parse() {
+            let (node, member) = member::split(&line.text);
+            let node: NodeName = match node.parse() {
                 Ok(node) => node,
                 Err(mistake) => {
                     line.refuse(mistake);
@@ -48,21 +49,34 @@ impl ServerOptions {
                     ),
                     "write the namespace by its URI: \"nsu=http://example.com/plc;i=6001\"",
                 ),
+                _ if !member.is_empty() && member::steps(member).is_none() => line.wrong(
+                    format!("\"{}\" names no part of a value", shown(member)),
+                    "write elements as [0] and members as .name: \"ns=2;i=6001[0].position\"",
+                ),
+                _ if !member.is_empty() && self.nodesets.is_empty() => line.wrong(
+                    format!("\"{}\" is a part of a value, and nothing says what that value is", shown(member)),
+                    "name the files that have the variable in \"nodeset\", or write a node without it",
+                ),
                 _ => {
                     let name = &table.signals[line.signal].name;
-                    let at = line.at();
-                    self.nodes.insert(name.clone(), Node { name: node, at });
+                    let node = Node {
+                        name: node,
+                        member: member.to_owned(),
+                        at: line.at(),
+                    };
+                    self.nodes.insert(name.clone(), node);
                     placed.push((name, line));
                 }
             }
         }
         let device = self.device_nodes(&[]);
-        let mut taken: HashMap<&(u16, Identifier), (&String, &At<'_>)> = HashMap::new();
+        let mut taken: HashMap<(&(u16, Identifier), &str), (&String, &At<'_>)> = HashMap::new();
         for (name, line) in &placed {
             let Some(node) = device.nodes.get(*name) else {
                 continue;
             };
-            if let Some((other, of)) = taken.insert(node, (name, line)) {
+            let key = (node, &*self.nodes[*name].member);
+            if let Some((other, of)) = taken.insert(key, (name, line)) {
                 for (line, name) in [(*line, other), (of, *name)] {
                     line.wrong(
                         format!("\"{}\" is that node, too", shown(name)),

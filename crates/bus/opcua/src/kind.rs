@@ -131,7 +131,9 @@ impl BusOptions for ServerOptions {
 
     fn place(&self, signal: &Signal, _table: &SignalTable) -> String {
         let node = self.nodes.get(&signal.name);
-        node.map_or_else(String::new, |node| shown(&node.name.to_string()))
+        node.map_or_else(String::new, |node| {
+            shown(&format!("{}{}", node.name, node.member))
+        })
     }
 }
 

@@ -8,6 +8,7 @@ mod codes;
 mod identity;
 mod keys;
 mod kind;
+mod member;
 mod namespaces;
 mod node;
 mod options;
@@ -34,6 +35,8 @@ mod values;
 #[cfg(feature = "opcua")]
 pub use client::Client;
 pub use identity::Identity;
+#[cfg(feature = "opcua")]
+use member::Step;
 pub use node::{Identifier, Namespace, NodeName, Pattern};
 pub use options::{ClientOptions, Node, ServerOptions};
 pub use security::{Credentials, Login, Mode, Policy, Secret, Trust};

@@ -55,8 +55,21 @@ pub struct ClientOptions {
 pub struct Node {
     /// The name.
     pub name: NodeName,
+    /// The steps to an element or a member of the node's value, as written behind a number; empty for all of it.
+    pub(super) member: String,
     /// The offset in the text.
     pub(super) at: usize,
+}
+
+impl Node {
+    /// A node whose value is one signal.
+    pub(super) const fn whole(name: NodeName, at: usize) -> Self {
+        Self {
+            name,
+            member: String::new(),
+            at,
+        }
+    }
 }
 
 /// The options of a server.
@@ -220,7 +233,7 @@ impl ClientOptions {
                 ),
                 Ok(node) => {
                     let at = line.at();
-                    self.nodes.insert(name.clone(), Node { name: node, at });
+                    self.nodes.insert(name.clone(), Node::whole(node, at));
                 }
             }
         }
@@ -443,7 +456,7 @@ fn read_nodes(value: &Value<'_>) -> Option<BTreeMap<String, Node>> {
         match node {
             Some(node) => {
                 let at = value.at();
-                nodes.insert(name.to_owned(), Node { name: node, at });
+                nodes.insert(name.to_owned(), Node::whole(node, at));
             }
             None => sound = false,
         }

@@ -41,6 +41,8 @@ pub struct Port {
     faults: FaultLayer,
     /// How faults spoil the answer that the bus is making.
     spoilt: Spoilt,
+    /// The stations whose answer to the last request is late.
+    late: Vec<usize>,
     clock: Arc<dyn Clock>,
     role: Role,
 }
@@ -59,6 +61,7 @@ impl Port {
         Self {
             faults: FaultLayer::new(Arc::default(), image.stations()),
             spoilt: Spoilt::default(),
+            late: Vec::new(),
             looks: Looks::new(status.max_age()),
             image: ImagePort {
                 validity: Validity::new(image.stations()),
@@ -389,6 +392,13 @@ impl Port {
     fn answer_by_faults(&mut self, station: usize, function: u8, now: Nanos) -> Option<u32> {
         self.faults.attend(now, &mut self.image);
         let spoilt = self.faults.answer(station, function);
+        if self.spoilt.late == Nanos::ZERO {
+            // The lateness of the answer before was taken.
+            self.late.clear();
+        }
+        if spoilt.late > Nanos::ZERO {
+            self.late.push(station);
+        }
         self.spoilt.late = self.spoilt.late.max(spoilt.late);
         self.spoilt.wrong = self.spoilt.wrong.or(spoilt.wrong);
         spoilt.error
@@ -404,6 +414,12 @@ impl Port {
     #[inline]
     pub fn take_lateness(&mut self) -> Nanos {
         std::mem::take(&mut self.spoilt.late)
+    }
+
+    /// The stations whose answer that was made last is late; only the first call returns them.
+    #[inline]
+    pub fn take_late_stations(&mut self) -> Vec<usize> {
+        std::mem::take(&mut self.late)
     }
 
     /// Makes the next [`take_diagnoses`](Self::take_diagnoses) repeat its last report, for stations that restart.

@@ -29,6 +29,10 @@ pub(super) struct Image {
     receives: RawValues,
     places: Vec<PublishedSignal>,
     frames: Vec<Box<[u8]>>,
+    /// Has the variables with several signals.
+    ids: Arc<Places>,
+    /// Those of them whose value has changed, by their first signals.
+    changed: Vec<usize>,
     show: Show,
     /// True if a write is an event even without a change.
     every_write: bool,
@@ -106,7 +110,7 @@ impl Image {
     /// An image whose nodes have no values yet.
     pub(super) fn new(
         table: &Arc<SignalTable>,
-        ids: &Places,
+        ids: &Arc<Places>,
         role: Role,
         port: &Port,
         show: Show,
@@ -139,6 +143,8 @@ impl Image {
             receives,
             places: (0..table.signals.len()).map(place).collect(),
             frames,
+            ids: Arc::clone(ids),
+            changed: Vec::new(),
             show,
             every_write,
         }
@@ -201,7 +207,7 @@ impl Image {
             for (index, signal) in self.table.signals.iter().enumerate() {
                 let is_sent = signal.area == self.role.areas().0;
                 if is_sent
-                    && let Some(span) = self.show.watched.span(index)
+                    && let Some(span) = self.span(index)
                     && now - self.places[index].since >= span
                 {
                     port.sent(&receipt.bits(signal.station, signal.address().bits()));
@@ -224,7 +230,44 @@ impl Image {
                 self.put(now, index, self.receives.bits(index), status);
             }
         }
+        self.show_wholes();
         self.show.tell_due(&self.places);
+    }
+
+    /// The time that the value of a signal must be shown; `None` without subscribers.
+    fn span(&self, signal: usize) -> Option<Nanos> {
+        let first = self.ids.wholes.first(signal);
+        self.show.watched.span(first.unwrap_or(signal))
+    }
+
+    /// Updates the variables with several signals, once for all their changes.
+    fn show_wholes(&mut self) {
+        for first in std::mem::take(&mut self.changed) {
+            let signals = self.ids.wholes.signals(first);
+            let shown = signals
+                .iter()
+                .filter_map(|signal| self.places[*signal].shown);
+            let mut known = shown
+                .map(|(_, status)| status)
+                .filter(|status| *status != StatusCode::BadWaitingForInitialData)
+                .peekable();
+            let status = match known.peek() {
+                // Clients have written elements of it; the others have their fail-safe values.
+                Some(_) => known
+                    .find(|status| !status.is_good())
+                    .unwrap_or(StatusCode::Good),
+                None => StatusCode::BadWaitingForInitialData,
+            };
+            let Some(value) = self.ids.wholes.value(first) else {
+                continue;
+            };
+            let variable = Variable {
+                signal: first,
+                is_scaled: false,
+            };
+            let value = self.show.value(status, value);
+            self.show.put(&self.places[first].node, variable, &value);
+        }
     }
 
     /// Reports to the port the stations whose subscribers have had time to see the last values.
@@ -236,7 +279,7 @@ impl Image {
                 })
                 .filter_map(|(index, _)| {
                     // No subscriber confirms a value: allow twice its time, and some for a notification to leave.
-                    let span = self.show.watched.span(index)?;
+                    let span = self.span(index)?;
                     Some(now - self.places[index].since >= span + span + TO_LEAVE)
                 });
             // A station without spans has no subscribers.
@@ -257,6 +300,7 @@ impl Image {
             return;
         };
         self.show_what_is_sent(port, now);
+        self.show_wholes();
         for &index in signals {
             let signal = &self.table.signals[index];
             if signal.area == self.role.areas().0 {
@@ -295,6 +339,13 @@ impl Image {
         place.shown = Some((bits, status));
         self.put_scaled(index);
         let raw = values::variant(self.table.signals[index].data_type, bits);
+        if let Some(first) = self.ids.wholes.first(index) {
+            self.ids.wholes.set(index, raw);
+            if !self.changed.contains(&first) {
+                self.changed.push(first);
+            }
+            return;
+        }
         let variable = Variable {
             signal: index,
             is_scaled: false,

@@ -29,6 +29,7 @@ use super::space::Places;
 use super::verdict::Verdict;
 use super::visitor::Visitor;
 use super::watched::{Rhythm, Variable, Watched};
+use super::whole::Written;
 use super::writers::Writers;
 use crate::namespaces::FIRST;
 
@@ -63,6 +64,7 @@ pub(super) struct Signals {
     /// The URIs of the namespaces from number 2 on.
     uris: Vec<String>,
     by_node: HashMap<NodeId, Variable>,
+    places: Arc<Places>,
     /// The signals that are pulses of methods.
     by_method: HashMap<NodeId, usize>,
     own: Own,
@@ -84,6 +86,32 @@ pub(super) struct Own {
     pub(super) tasks_alone: Arc<AtomicUsize>,
 }
 
+/// A value that a client may write.
+enum Judged {
+    /// All of a signal's variable.
+    All([(usize, u64); 1]),
+    /// The variable that is known by this signal, or some of its elements.
+    Parts(usize, Written),
+}
+
+impl Judged {
+    /// The signals that it sets, with their bits.
+    fn signals(&self) -> &[(usize, u64)] {
+        match self {
+            Self::All(signal) => signal,
+            Self::Parts(_, written) => &written.signals,
+        }
+    }
+}
+
+/// The node with a signal's own value.
+const fn variable_of(signal: usize) -> Variable {
+    Variable {
+        signal,
+        is_scaled: false,
+    }
+}
+
 impl fmt::Debug for Signals {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Signals").finish_non_exhaustive()
@@ -92,26 +120,29 @@ impl fmt::Debug for Signals {
 
 impl Signals {
     /// The signals of `table`.
-    pub(super) fn new(table: Arc<SignalTable>, places: &Places, own: Own) -> Self {
+    pub(super) fn new(table: Arc<SignalTable>, places: &Arc<Places>, own: Own) -> Self {
         let (mut by_node, mut by_method) = (HashMap::new(), HashMap::new());
         for index in 0..table.signals.len() {
-            let variable = |is_scaled| Variable {
-                signal: index,
-                is_scaled,
-            };
             if places.is_method(index) {
                 by_method.insert(places.node(index).clone(), index);
                 continue;
             }
             if let Some((scaled, _)) = places.scaled(&table, index) {
-                by_node.insert(scaled, variable(true));
+                let variable = Variable {
+                    signal: index,
+                    is_scaled: true,
+                };
+                by_node.insert(scaled, variable);
             }
-            by_node.insert(places.node(index).clone(), variable(false));
+            // A variable with several signals is known by its first one.
+            let first = places.wholes.first(index).unwrap_or(index);
+            by_node.insert(places.node(index).clone(), variable_of(first));
         }
         Self {
             table,
             uris: places.uris.clone(),
             by_node,
+            places: Arc::clone(places),
             by_method,
             own,
             judged: Mutex::default(),
@@ -169,8 +200,7 @@ impl Signals {
         if let Err(status) = self.admits(context) {
             return vec![refused(status); nodes.len()];
         }
-        let signal = |id: &NodeId| self.by_node.get(id).map(|variable| variable.signal);
-        let signals = nodes.iter().filter_map(|node| signal(&node.node_id));
+        let signals = nodes.iter().flat_map(|node| self.signals(&node.node_id));
         let signals = signals.collect();
         let (done, ready) = oneshot::channel();
         let visit = Visit::Reads(Visitor::of(context), signals, is_read, done);
@@ -180,8 +210,7 @@ impl Signals {
         let read = {
             let space = address_space.read();
             let read = nodes.iter().map(|node| {
-                let station = signal(&node.node_id).map(|at| self.table.signals[at].station);
-                let status = station.and_then(|station| verdict.status(station));
+                let status = self.refusal(&node.node_id, &verdict);
                 status.map_or_else(|| space.read(context, node, max_age, timestamps), refused)
             });
             read.collect()
@@ -190,13 +219,31 @@ impl Signals {
         read
     }
 
-    /// Checks one value that a client writes; returns its signal and its bits.
+    /// The signals of a node: none, one, or those that are parts of its value.
+    fn signals(&self, id: &NodeId) -> Vec<usize> {
+        let variable = self.by_node.get(id);
+        variable.map_or_else(Vec::new, |variable| {
+            self.places.wholes.signals(variable.signal)
+        })
+    }
+
+    /// The status with which faults refuse a node.
+    fn refusal(&self, id: &NodeId, verdict: &Verdict) -> Option<StatusCode> {
+        if verdict.refused.is_empty() {
+            return None;
+        }
+        let signals = self.signals(id).into_iter();
+        let mut stations = signals.map(|signal| self.table.signals[signal].station);
+        stations.find_map(|station| verdict.status(station))
+    }
+
+    /// Checks one value that a client writes.
     fn judge(
         &self,
         space: &AddressSpace,
         write: &ParsedWriteValue,
         verdict: &Verdict,
-    ) -> Result<(usize, u64), StatusCode> {
+    ) -> Result<Judged, StatusCode> {
         let Some(&variable) = self.by_node.get(&write.node_id) else {
             return Err(if space.node_exists(&write.node_id) {
                 StatusCode::BadNotWritable
@@ -205,7 +252,7 @@ impl Signals {
             });
         };
         let signal = &self.table.signals[variable.signal];
-        if let Some(status) = verdict.status(signal.station) {
+        if let Some(status) = self.refusal(&write.node_id, verdict) {
             return Err(status);
         }
         if write.attribute_id != AttributeId::Value || variable.is_scaled {
@@ -214,16 +261,22 @@ impl Signals {
         if signal.area != self.own.reads {
             return Err(StatusCode::BadUserAccessDenied);
         }
-        if write.index_range != NumericRange::None {
-            return Err(StatusCode::BadWriteNotSupported);
-        }
-        // A value with a bad status is no value.
+        // A value with a bad status has no meaning for a signal.
         if write.value.status.is_some_and(|status| !status.is_good()) {
             return Err(StatusCode::BadWriteNotSupported);
         }
         let value = write.value.value.as_ref();
+        let wholes = &self.places.wholes;
+        let range = (&write.index_range, value);
+        if let Some(judged) = wholes.judge(&self.table, variable.signal, range) {
+            return judged.map(|written| Judged::Parts(variable.signal, written));
+        }
+        if write.index_range != NumericRange::None {
+            return Err(StatusCode::BadWriteNotSupported);
+        }
         let bits = value.and_then(|value| values::bits(signal.data_type, value));
-        Ok((variable.signal, bits.ok_or(StatusCode::BadTypeMismatch)?))
+        let bits = bits.ok_or(StatusCode::BadTypeMismatch)?;
+        Ok(Judged::All([(variable.signal, bits)]))
     }
 
     /// Writes what may be written.
@@ -243,12 +296,13 @@ impl Signals {
             .iter()
             .map(|node| self.judge(&space, node.value(), verdict))
             .collect();
-        let indices = judged.iter().flatten().map(|&(index, _)| index);
+        let signals = judged.iter().flatten().flat_map(Judged::signals);
+        let indices = signals.map(|&(index, _)| index);
         let refused = writers.refuses(session, indices);
         let is_refused = refused.is_some();
         let mut second = refused;
         for (node, judged) in nodes_to_write.iter_mut().zip(judged) {
-            let (index, bits) = match judged {
+            let judged = match judged {
                 Ok(judged) => judged,
                 Err(status) => {
                     node.set_status(status);
@@ -259,13 +313,20 @@ impl Signals {
                 node.set_status(StatusCode::BadUserAccessDenied);
                 continue;
             }
-            if let Some(other) = writers.write(session, index) {
-                second.get_or_insert(other);
+            for &(index, _) in judged.signals() {
+                if let Some(other) = writers.write(session, index) {
+                    second.get_or_insert(other);
+                }
             }
+            let signals = judged.signals().to_vec();
             node.set_status(StatusCode::Good);
             let written = &node.value().value;
+            let whole = match judged {
+                Judged::All(_) => None,
+                Judged::Parts(first, written) => self.places.wholes.accept(first, written),
+            };
             let value = DataValue {
-                value: written.value.clone(),
+                value: whole.or_else(|| written.value.clone()),
                 status: Some(StatusCode::Good),
                 source_timestamp: written.source_timestamp.or(Some(now)),
                 server_timestamp: Some(now),
@@ -279,10 +340,11 @@ impl Signals {
             let watched = &self.own.watched;
             watched.tell(&context.subscriptions, id, variable, &value);
             let last = lists.last_mut().expect("there is always one");
-            if last.iter().any(|(other, _)| *other == index) {
-                lists.push(vec![(index, bits)]);
+            let is_in_last = |(index, _): &(usize, u64)| last.iter().any(|(of, _)| of == index);
+            if signals.iter().any(is_in_last) {
+                lists.push(signals);
             } else {
-                last.push((index, bits));
+                last.extend(signals);
             }
         }
         let inbox = &self.own.inbox;

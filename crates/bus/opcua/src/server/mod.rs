@@ -1,8 +1,10 @@
 //! The server: the signals as nodes, for PLCs and other programs that are OPC UA clients.
 
+mod content;
 mod image;
 mod manager;
 mod nodeset;
+mod parts;
 mod peers;
 mod setup;
 mod space;
@@ -11,6 +13,7 @@ mod units;
 mod verdict;
 mod visitor;
 mod watched;
+mod whole;
 mod writers;
 
 use std::net::TcpListener;
@@ -368,7 +371,7 @@ impl Service<'_> {
                 let mut verdict = Verdict::default();
                 if is_read {
                     verdict = self.judge(port, now, &signals, READ);
-                    // What is refused is not shown, and a pulse in it waits.
+                    // A refused value is not shown, so a pulse in it waits for the next Read.
                     let is_refused = |signal: &usize| {
                         let station = self.table.signals[*signal].station;
                         verdict.refused.iter().any(|(of, _)| *of == station)
@@ -440,9 +443,10 @@ impl Service<'_> {
         });
         let refused = refused.collect();
         let late = u64::try_from(port.take_lateness().0).unwrap_or(0);
+        let late = std::time::Duration::from_nanos(late);
         Verdict {
             refused,
-            late: std::time::Duration::from_nanos(late),
+            due: (!late.is_zero()).then(|| std::time::Instant::now() + late),
         }
     }
 

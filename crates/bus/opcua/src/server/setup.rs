@@ -133,6 +133,9 @@ pub(super) fn build(
         signals
     };
     let wall = pki.wall;
+    if let Some(loader) = of.places.wholes.loader() {
+        builder = builder.with_type_loader(loader);
+    }
     let built = builder
         // The signals' own manager must be the last.
         .with_node_manager(move |context| Standard::new(context, wall))

@@ -15,7 +15,9 @@ use tickbus_base::toml_text::shown;
 use tickbus_image::signal::{Area, DataType, Scale, Signal, SignalTable};
 
 use super::nodeset::{NodeSets, Target};
+use super::parts::{self, Parts};
 use super::units::unit;
+use super::whole::Wholes;
 use crate::namespaces::FIRST;
 use crate::{Identifier, ServerOptions};
 
@@ -39,6 +41,8 @@ pub(super) struct Places {
     nodesets: NodeSets,
     /// By signal, its node in the maker's address space; `None` for one that is added.
     targets: Vec<Option<Target>>,
+    /// The maker's variables that have several signals.
+    pub(super) wholes: Wholes,
 }
 
 impl Places {
@@ -79,19 +83,36 @@ impl Places {
             uris: device.uris,
             nodesets,
             targets: vec![None; table.signals.len()],
+            wholes: Wholes::default(),
         };
         if options.nodesets.is_empty() {
             return Ok(places);
         }
-        let mut found = places
+        let (mut found, mut types) = places
             .nodesets
             .check(|uri| places.index(uri))
             .map_err(whole)?;
         let mut mistakes = Vec::new();
+        let mut parts = Parts::default();
         for (index, signal) in table.signals.iter().enumerate() {
             let Some(line) = options.nodes.get(&signal.name) else {
                 continue;
             };
+            let is_node = |id: &NodeId| found.contains_key(id);
+            if let Some((node, steps)) = parts::split(&places.nodes[index], &line.member, is_node) {
+                places.nodes[index] = node.clone();
+                places.targets[index] = Some(Target::Member);
+                parts.add(node, (index, line.at), steps);
+            }
+        }
+        places.wholes = parts.resolve(table, &mut found, &mut types, &mut mistakes);
+        for (index, signal) in table.signals.iter().enumerate() {
+            let Some(line) = options.nodes.get(&signal.name) else {
+                continue;
+            };
+            if places.targets[index].is_some() {
+                continue;
+            }
             let target = found.remove(&places.nodes[index]);
             match bind(signal, target.as_ref(), options.role.areas().1) {
                 Ok(target) => places.targets[index] = Some(target),
@@ -162,7 +183,10 @@ pub(super) fn build(
             variable.set_access_level(access);
             variable.set_user_access_level(access);
             variable.set_minimum_sampling_interval(0.0);
-            variable.set_data_value(DataValue::new_now(variant(signal.data_type, 0)));
+            let first = places.wholes.first(index);
+            let whole = first.and_then(|first| places.wholes.value(first));
+            let value = whole.unwrap_or_else(|| variant(signal.data_type, 0));
+            variable.set_data_value(DataValue::new_now(value));
         }
     }
     if others.is_empty() {
@@ -228,11 +252,11 @@ fn bind(signal: &Signal, target: Option<&Target>, reads: Area) -> Result<Target,
                 "name it for a BOOL that clients write, with latch = \"rising\"",
             ))
         }
-        Some(Target::List) => Err(Mistake::new(
-            format!("the variable has lists, and the signal \"{name}\" is a single value"),
-            "name a variable with a single value",
+        Some(Target::List(_)) => Err(Mistake::new(
+            format!("the variable has an array, and the signal \"{name}\" is a single value"),
+            "name an element of it, such as \"ns=2;i=6001[0]\"",
         )),
-        Some(Target::Other) => Err(Mistake::new(
+        Some(Target::Other | Target::Member) => Err(Mistake::new(
             "the node is neither a variable nor a method",
             "name the variable below it that has the value",
         )),

@@ -1,16 +1,20 @@
 //! The changes that faults make to the answer to a request.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use opcua::types::StatusCode;
+
+/// How much later than stated the runtime's timer can fire: it counts whole milliseconds, and so does the system's call
+/// that waits for it.
+const COARSE: Duration = Duration::from_millis(2);
 
 /// How faults change the answer to a request.
 #[derive(Debug, Default)]
 pub(super) struct Verdict {
     /// The stations that refuse the request, with this status.
     pub(super) refused: Vec<(usize, StatusCode)>,
-    /// How much later the answer goes out.
-    pub(super) late: Duration,
+    /// When the answer goes out, if not at once.
+    pub(super) due: Option<Instant>,
 }
 
 impl Verdict {
@@ -20,10 +24,15 @@ impl Verdict {
         found.map(|(_, status)| *status)
     }
 
-    /// Holds the answer back. The timer counts whole milliseconds, so that the answer goes out up to 2 ms later.
+    /// Holds the answer back until it is due. The end of the wait is spent polling, because the timer is too coarse.
     pub(super) async fn hold(&self) {
-        if !self.late.is_zero() {
-            tokio::time::sleep(self.late).await;
+        let Some(due) = self.due else {
+            return;
+        };
+        let left = due.saturating_duration_since(Instant::now());
+        tokio::time::sleep(left.saturating_sub(COARSE)).await;
+        while Instant::now() < due {
+            tokio::task::yield_now().await;
         }
     }
 }

@@ -119,6 +119,15 @@ pub fn serve<S: Service>(
 /// At most this many answers to a client are held back.
 const HELD: usize = 1000;
 
+/// An answer that a fault holds back.
+#[derive(Debug)]
+struct Held {
+    due: Nanos,
+    answer: Vec<u8>,
+    /// The stations that answer late; empty for an answer that waits behind another one.
+    stations: Vec<usize>,
+}
+
 /// At most this many bytes are read from a client per turn, before others are served.
 const BUFFER: usize = 4096;
 
@@ -173,7 +182,7 @@ struct Client<C> {
     /// The time since which either of them has been waiting.
     waits_since: Option<Nanos>,
     /// Answers that a fault holds back, in the order of their requests, each with its time.
-    held: VecDeque<(Nanos, Vec<u8>)>,
+    held: VecDeque<Held>,
     /// The entry in [`Clients::held`].
     held_until: Option<Nanos>,
 }
@@ -221,7 +230,7 @@ impl<C> Clients<C> {
         let Some(client) = self.places.get_mut(place).and_then(Option::as_mut) else {
             return;
         };
-        let due = client.held.front().map(|(due, _)| *due);
+        let due = client.held.front().map(|held| held.due);
         let before = std::mem::replace(&mut client.held_until, due);
         if before == due {
             return;
@@ -428,9 +437,15 @@ impl<S: Service> Server<'_, S> {
             self.reply.clear();
             let client = self.clients.places[place].as_mut();
             let client = client.expect("its answers are held back");
-            while client.held.front().is_some_and(|(due, _)| *due <= now) {
-                let (_, answer) = client.held.pop_front().expect("it was just there");
-                self.reply.extend_from_slice(&answer);
+            while client.held.front().is_some_and(|held| held.due <= now) {
+                let held = client.held.pop_front().expect("it was just there");
+                let mut stations = held.stations.into_iter();
+                if stations.any(|station| !port.is_station_up(station, now)) {
+                    // A dead station sends nothing, not even the answer that it owes.
+                    self.service.unheard(&mut client.state, now, port);
+                } else {
+                    self.reply.extend_from_slice(&held.answer);
+                }
             }
             if !client.unsent.is_empty() {
                 client.unsent.append(&mut self.reply);
@@ -631,9 +646,15 @@ impl<C> Client<C> {
                     ));
                     return Err((telegrams, error));
                 }
-                let before = self.held.back().map_or(now, |(due, _)| *due);
-                let due = before.max(now + late);
-                self.held.push_back((due, reply.split_off(begin)));
+                let before = self.held.back().map_or(now, |held| held.due);
+                let is_late = late > Nanos::ZERO;
+                self.held.push_back(Held {
+                    due: before.max(now + late),
+                    answer: reply.split_off(begin),
+                    stations: is_late
+                        .then(|| port.take_late_stations())
+                        .unwrap_or_default(),
+                });
             }
         }
         if rest.len() > longest {

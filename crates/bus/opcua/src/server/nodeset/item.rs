@@ -14,7 +14,7 @@ use opcua_server::address_space::{
 use roxmltree::Node;
 use tickbus_base::toml_text::shown;
 
-use super::{TagName, child, value};
+use super::{TagName, child, types, value};
 use crate::namespaces::UA;
 
 /// The types of the standard by their names, which some files use without an alias.
@@ -38,7 +38,7 @@ fn standard(name: &str) -> Option<NodeId> {
 /// The names of a file.
 pub(super) struct Reader<'t> {
     aliases: HashMap<&'t str, &'t str>,
-    /// The numbers of its namespaces in the server; `None` for one that the server has not.
+    /// The numbers of its namespaces in the server; `None` for a namespace that the server does not have.
     indices: Vec<Option<u16>>,
 }
 
@@ -61,7 +61,7 @@ impl<'t> Reader<'t> {
         }
     }
 
-    /// The node of an element; `None` for an element that is none.
+    /// The node of an element; `None` if the element does not describe a node.
     pub(super) fn item(&self, element: Node<'_, '_>) -> Result<Option<ImportedItem>, String> {
         let class = match element.tag_name().name() {
             "UAObject" => NodeClass::Object,
@@ -105,7 +105,10 @@ impl<'t> Reader<'t> {
                 View::new_full(base, notifier()?, flag(element, "ContainsNoLoops", false)).into()
             }
             NodeClass::ObjectType => ObjectType::new_full(base, is_abstract).into(),
-            NodeClass::DataType => DataType::new_full(base, is_abstract, None).into(),
+            NodeClass::DataType => {
+                let definition = types::definition(element, &|text| self.id(text))?;
+                DataType::new_full(base, is_abstract, definition).into()
+            }
             NodeClass::Method => Method::new_full(
                 base,
                 flag(element, "Executable", true),
@@ -123,7 +126,7 @@ impl<'t> Reader<'t> {
                 VariableType::new_full(base, data_type()?, is_abstract, rank, value, dimensions)
                     .into()
             }
-            // What no signal is can be read alone.
+            // A variable without a signal is read-only.
             _ => {
                 let readable = number::<u8>(element, "AccessLevel", 1)? & 1;
                 Variable::new_full(
@@ -200,12 +203,12 @@ impl<'t> Reader<'t> {
     }
 }
 
-fn flag(element: Node<'_, '_>, name: &str, usual: bool) -> bool {
+pub(super) fn flag(element: Node<'_, '_>, name: &str, usual: bool) -> bool {
     let text = element.attribute(name);
     text.map_or(usual, |text| matches!(text.trim(), "true" | "1"))
 }
 
-fn number<T: FromStr>(element: Node<'_, '_>, name: &str, usual: T) -> Result<T, String> {
+pub(super) fn number<T: FromStr>(element: Node<'_, '_>, name: &str, usual: T) -> Result<T, String> {
     let Some(text) = element.attribute(name) else {
         return Ok(usual);
     };
@@ -213,7 +216,7 @@ fn number<T: FromStr>(element: Node<'_, '_>, name: &str, usual: T) -> Result<T, 
     text.trim().parse().map_err(wrong)
 }
 
-fn dimensions(element: Node<'_, '_>) -> Result<Option<Vec<u32>>, String> {
+pub(super) fn dimensions(element: Node<'_, '_>) -> Result<Option<Vec<u32>>, String> {
     let text = element.attribute("ArrayDimensions").unwrap_or_default();
     if text.trim().is_empty() {
         return Ok(None);
@@ -225,7 +228,7 @@ fn dimensions(element: Node<'_, '_>) -> Result<Option<Vec<u32>>, String> {
 }
 
 /// The first text of that name: files have the one without a locale, or in English, first.
-fn localized(element: Node<'_, '_>, name: &str) -> Option<LocalizedText> {
+pub(super) fn localized(element: Node<'_, '_>, name: &str) -> Option<LocalizedText> {
     let text = child(element, name)?;
     let locale = text.attribute("Locale").unwrap_or_default();
     Some(LocalizedText::new(locale, text.text().unwrap_or_default()))

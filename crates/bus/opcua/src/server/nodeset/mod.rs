@@ -1,19 +1,25 @@
 //! `NodeSet2` files: a maker's address space, in the XML of OPC 10000-6, annex F.
 
 mod item;
+mod types;
 mod value;
 
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 use std::sync::Arc;
 
-use opcua::types::{NodeClass, NodeId, ReferenceTypeId};
-use opcua_server::address_space::{AddressSpace, HasNodeId, ImportedItem, NodeType};
+use opcua::types::{
+    DataEncoding, DataValue, NodeClass, NodeId, NumericRange, ReferenceTypeId, TimestampsToReturn,
+    Variant,
+};
+use opcua_server::address_space::{AddressSpace, HasNodeId, ImportedItem, NodeType, Variable};
 use roxmltree::{Document, Node, ParsingOptions};
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::shown;
 
 use crate::namespaces::UA;
+
+pub(crate) use types::Types;
 
 /// The longest file, in bytes.
 const LONGEST: u64 = 64 << 20;
@@ -33,9 +39,36 @@ pub(crate) struct NodeSets {
 #[derive(Debug)]
 struct File {
     name: String,
-    text: String,
+    text: Packed,
     /// The URIs of its namespaces from number 1 on.
     uris: Vec<String>,
+}
+
+/// A text, deflated: nodes are made again whenever the server inside restarts, and XML shrinks to a tenth.
+#[derive(Debug)]
+struct Packed {
+    bytes: Vec<u8>,
+    length: usize,
+}
+
+impl Packed {
+    /// Fast: the higher levels save little more of XML.
+    const LEVEL: u8 = 1;
+
+    fn new(text: &str) -> Self {
+        Self {
+            bytes: miniz_oxide::deflate::compress_to_vec(text.as_bytes(), Self::LEVEL),
+            length: text.len(),
+        }
+    }
+
+    fn text(&self) -> String {
+        let mut text = vec![0; self.length];
+        let parts = std::iter::once(&*self.bytes);
+        miniz_oxide::inflate::decompress_slice_iter_to_slice(&mut text, parts, false, true)
+            .expect("it was packed here");
+        String::from_utf8(text).expect("it was a text")
+    }
 }
 
 impl NodeSets {
@@ -62,7 +95,7 @@ impl NodeSets {
             }
             files.push(Arc::new(File {
                 name: name.clone(),
-                text,
+                text: Packed::new(&text),
                 uris,
             }));
         }
@@ -92,7 +125,8 @@ impl NodeSets {
         mut take: impl FnMut(ImportedItem),
     ) -> Result<(), Mistake> {
         for file in &self.files {
-            let document = parse(&file.name, &file.text)?;
+            let text = file.text.text();
+            let document = parse(&file.name, &text)?;
             let reader = item::Reader::new(document.root_element(), &file.uris, &index);
             for element in document.root_element().children() {
                 let item = reader.item(element).map_err(|what| {
@@ -122,15 +156,19 @@ impl NodeSets {
         space: &mut AddressSpace,
         index: impl Fn(&str) -> Option<u16>,
     ) -> Result<(), Mistake> {
+        let mut types = Types::default();
         self.each(index, |item| {
             // Of two nodes with one id the first counts; files of one model repeat some.
             if !space.node_exists(item.node.node_id()) {
+                types.take(&item);
                 space.import_node(item);
             }
-        })
+        })?;
+        types.define(space);
+        Ok(())
     }
 
-    /// The nodes that signals can be, after a check of the types.
+    /// The nodes that signals can be, and the types, which are checked.
     ///
     /// # Errors
     ///
@@ -138,12 +176,14 @@ impl NodeSets {
     pub(crate) fn check(
         &self,
         index: impl Fn(&str) -> Option<u16>,
-    ) -> Result<HashMap<NodeId, Target>, Mistake> {
+    ) -> Result<(HashMap<NodeId, Target>, Types), Mistake> {
+        let mut types = Types::default();
         let mut targets = HashMap::new();
         // A type can state several, and the crate takes any of them.
         let mut supertypes: HashMap<NodeId, Vec<NodeId>> = HashMap::new();
         self.each(index, |item| {
             let id = item.node.node_id().clone();
+            types.take(&item);
             let is_type = !matches!(
                 item.node.node_class(),
                 NodeClass::Object | NodeClass::Variable | NodeClass::Method | NodeClass::View
@@ -160,7 +200,9 @@ impl NodeSets {
                 supertypes.entry(sub).or_default().push(of);
             }
             let target = match &item.node {
-                NodeType::Variable(variable) if variable.value_rank() >= 0 => Target::List,
+                NodeType::Variable(variable) if variable.value_rank() != -1 => {
+                    Target::List(List::of(variable))
+                }
                 NodeType::Variable(variable) => Target::Variable(variable.data_type()),
                 NodeType::Method(_) => Target::Method,
                 _ => Target::Other,
@@ -173,7 +215,41 @@ impl NodeSets {
                 "correct the file, or ask its maker",
             ));
         }
-        Ok(targets)
+        Ok((targets, types))
+    }
+}
+
+/// A variable with an array.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct List {
+    pub(crate) data_type: NodeId,
+    pub(crate) rank: i32,
+    /// The stated sizes; 0 where any is possible.
+    pub(crate) sizes: Vec<u32>,
+    /// The number of elements in the file.
+    pub(crate) length: u32,
+}
+
+impl List {
+    fn of(variable: &Variable) -> Self {
+        let value = match &variable.value(
+            TimestampsToReturn::Neither,
+            &NumericRange::None,
+            &DataEncoding::Binary,
+            0.0,
+        ) {
+            DataValue {
+                value: Some(Variant::Array(array)),
+                ..
+            } => array.values.len(),
+            _ => 0,
+        };
+        Self {
+            data_type: variable.data_type(),
+            rank: variable.value_rank(),
+            sizes: variable.array_dimensions().unwrap_or_default(),
+            length: u32::try_from(value).unwrap_or(u32::MAX),
+        }
     }
 }
 
@@ -182,8 +258,10 @@ impl NodeSets {
 pub(crate) enum Target {
     /// A variable with values of this type.
     Variable(NodeId),
-    /// A variable with lists of values.
-    List,
+    /// A variable with an array of values, whose elements can be signals.
+    List(List),
+    /// A variable that has the signal as an element or a member.
+    Member,
     /// A method, whose call is a pulse of a BOOL.
     Method,
     /// A node without a value.

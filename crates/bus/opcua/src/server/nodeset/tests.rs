@@ -17,7 +17,8 @@ fn load(texts: &[&str]) -> Result<NodeSets, Mistake> {
 
 fn check(nodes: &str) -> Result<HashMap<NodeId, Target>, Mistake> {
     let text = format!("{HEAD}\n{nodes}\n</UANodeSet>");
-    load(&[&text])?.check(|uri| (uri == "urn:a").then_some(7))
+    let found = load(&[&text])?.check(|uri| (uri == "urn:a").then_some(7))?;
+    Ok(found.0)
 }
 
 #[test]

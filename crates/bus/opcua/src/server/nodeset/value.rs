@@ -13,7 +13,7 @@ use super::{child, text_of};
 /// Reads a node id of the file.
 type ReadId<'r> = &'r dyn Fn(&str) -> Result<NodeId, String>;
 
-/// The value of an element; empty for a structure that is none of the standard's frequent ones.
+/// The value of an element; empty for a structure that is not one of the standard's frequent ones.
 pub(super) fn variant(element: Node<'_, '_>, id: ReadId<'_>) -> Variant {
     let name = element.tag_name().name();
     let Some(single) = name.strip_prefix("ListOf") else {

@@ -9,10 +9,10 @@ use std::time::Duration;
 
 use async_trait::async_trait;
 use opcua::types::{
-    AttributeId, ExpandedNodeId, MonitoringMode, NodeId, StatusCode, TimestampsToReturn,
+    AttributeId, DateTime, ExpandedNodeId, MonitoringMode, NodeId, StatusCode, TimestampsToReturn,
 };
 use opcua_server::CreateMonitoredItem;
-use opcua_server::address_space::DefaultTypeTree;
+use opcua_server::address_space::{DefaultTypeTree, ImportedItem};
 use opcua_server::diagnostics::NamespaceMetadata;
 use opcua_server::node_manager::{
     BrowseNode, BrowsePathItem, ExternalReferenceRequest, MethodCall, MonitoredItemRef,
@@ -27,6 +27,11 @@ use nodes::Nodes;
 
 /// How often the values that change are looked at for those who subscribe to them, at most.
 const SAMPLING: Duration = Duration::from_millis(100);
+
+/// Passes on every standard node, with its references.
+pub(super) fn each(mut take: impl FnMut(&ImportedItem)) {
+    table::read(DateTime::null(), |item| take(&item));
+}
 
 /// The manager of these nodes for one server: it supplies the values that describe the server, and leaves the rest to
 /// the nodes themselves. The crate's own is only there together with the nodes as code.

@@ -16,7 +16,7 @@ use foreign::Absent;
 use foreign::machine::Machine;
 use tickbus::fieldbus::profibus::Gsd;
 #[cfg(unix)]
-use tickbus_conformance::rig::statistic;
+use tickbus_conformance::rig::{logged, statistic};
 
 fn main() -> ExitCode {
     foreign::main(&[(
@@ -121,12 +121,14 @@ fn records() -> Result<(), Absent> {
         "[driver]\nid = 1\nname = \"Drive 4\"\n[fieldbus]\nkind = \"profibus-device\"\ndevice = \"{port}\"\n\
          baud = 500000\nmax_tsdr = 16000\nmax_age = \"5s\"\naddress = 8\n\
          ident = 0x80E1\nconfig = [0xF1]\nrecords = [\"slot 0 record 10 = 01 02\"]\n\
+         parameters = [\"945 Unsigned16 = 1355 0 0 0 0 0 0 0\"]\n\
          [[signal]]\nname = \"out\"\naddress = \"%QD0\"\ntype = \"UDINT\"\n\
          [[signal]]\nname = \"in\"\naddress = \"%ID0\"\ntype = \"UDINT\"\n\
          [[signal]]\nname = \"ramp\"\naddress = \"%QW4\"\ntype = \"INT\"\n\
          [[signal]]\nname = \"warmth\"\naddress = \"%IW4\"\ntype = \"INT\"\n\
          [[signal]]\nname = \"warm\"\naddress = \"%IX6.0\"\n\
-         [fieldbus.at]\nramp = \"slot 1 record 10 %QW0\"\nwarmth = \"slot 1 record 11 %IW0\"\n\
+         [[signal]]\nname = \"time\"\naddress = \"%QD8\"\ntype = \"REAL\"\n\
+         [fieldbus.at]\ntime = \"parameter 1121\"\nramp = \"slot 1 record 10 %QW0\"\nwarmth = \"slot 1 record 11 %IW0\"\n\
          warm = \"slot 1 record 11 %IX2.7\"\n"
     );
     write_gsd(folder.path(), &text, own);
@@ -136,6 +138,13 @@ fn records() -> Result<(), Absent> {
     });
     master.arg(SCRIPT).arg(line.end(1));
     master.args(["500000", "8", own, "2 words in and out, consistent"]);
+    for refused in [
+        "cannot read record 12 of slot 1",
+        "cannot read record 10 of slot 5",
+        "cannot write record 10 of slot 1",
+    ] {
+        logged::expect(refused);
+    }
     let ramps = std::cell::RefCell::new(Vec::new());
     let told = machine.until_the_end_of(master, |machine| {
         machine.tick();
@@ -164,6 +173,11 @@ fn records() -> Result<(), Absent> {
         "5e00ff44 5e00ff440800fde80000000000000000000000006964656e7420383045312020202020202020202073746174696f6e20382020\
          20202020200001560100000000f60000000101000e"
             .to_owned(),
+        // The examples of a maker's manuals: eight faults are read, and a time is changed to 12.15.
+        "5f012f0a25010201100803b10000 5f012f0a".to_owned(),
+        "5e012ff0 5e012f16250102010608054b0000000000000000000000000000".to_owned(),
+        "5f012f1080020101100104610000080141426666 5f012f10".to_owned(),
+        "5e012ff0 5e012f0480020101".to_owned(),
         format!("{initiate} 563000c8"),
         "57f00100000000000002000200000000".to_owned(),
         format!("{initiate} 562f00c8"),
@@ -179,6 +193,7 @@ fn records() -> Result<(), Absent> {
     ];
     let expected = expected.join("\n");
     assert!(told.contains(&expected), "expected {expected}\ntold {told}");
+    assert!((machine.get("time") - 12.15).abs() < 1e-6);
     assert_eq!(
         ramps.into_inner(),
         [0.0, f64::from(0x1234), f64::from(0x5678)]

@@ -141,6 +141,10 @@ def main():
         "5f000a020102",
         "5f00ff040800fde8",
         "5e00ff44",
+        "5f012f0a25010201100803b10000",
+        "5e012ff0",
+        "5f012f1080020101100104610000080141426666",
+        "5e012ff0",
     ]:
         station.ask(ms1, server, request)
     # Other masters, two of which have a connection.

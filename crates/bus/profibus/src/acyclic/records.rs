@@ -19,7 +19,7 @@ pub struct Record {
     pub is_writable: bool,
 }
 
-/// What a master has written into a record before it reads the record.
+/// The requests of a master that its next reading answers.
 #[derive(Debug, Default)]
 pub(super) struct Called {
     /// The part of record 255 that it has named in a slot.

@@ -11,6 +11,7 @@ mod bridge_bus;
 mod commands;
 #[path = "../it/fmi/fixture.rs"]
 mod fixture;
+mod devices;
 mod fmi;
 mod gateway;
 mod harness;
@@ -59,6 +60,7 @@ fn main() -> ExitCode {
         ("modbus", modbus::TESTS),
         #[cfg(feature = "modbus-tls")]
         ("modbus_tls", modbus_tls::TESTS),
+        ("devices", devices::TESTS),
         #[cfg(feature = "page")]
         ("observed_rig", observed_rig::TESTS),
         ("observer", observer::TESTS),

@@ -1,4 +1,4 @@
-//! A motor behind a contactor.
+//! A motor behind a contactor or a drive.
 
 use tickbus_base::time::Nanos;
 
@@ -6,7 +6,7 @@ use super::delay::Delay;
 use super::io::Io;
 use super::levels::Levels;
 use super::part::{Part, Rates};
-use super::signal::Output;
+use super::signal::{Input, Output};
 
 /// `kind = "motor"`: the contactor's feedback, the speed, and the overload relay.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,6 +17,8 @@ pub(crate) struct Motor {
     /// The parts of full speed per second: from standstill, and back.
     pub(crate) rates: Rates,
     pub(crate) full_speed: f64,
+    /// The speed that a drive is told to run at, from 0 to full speed; without it, full speed.
+    pub(crate) target: Option<Input>,
     /// The overload relay trips while these hold.
     pub(crate) trip: Option<Levels>,
     /// A relay that has tripped stays so until these hold; without them, until `trip` no longer holds.
@@ -43,11 +45,22 @@ impl Motor {
         }
         let wanted = self.contactor.hold(io.slots) && !self.has_tripped;
         let runs = self.contact.step(wanted, io.now);
-        let moves = self
-            .part
-            .step(Some(f64::from(u8::from(runs))), self.rates, io);
+        let to = match self.target {
+            _ if !runs => Some(0.0),
+            Some(target) => {
+                let part = target.value(io.slots) / self.full_speed;
+                // A target that is no number leaves the speed where it is.
+                (!part.is_nan()).then(|| part.clamp(0.0, 1.0))
+            }
+            None => Some(1.0),
+        };
+        let moves = self.part.step(to, self.rates, io);
+        let is_there = match self.target {
+            Some(_) => runs && !moves,
+            None => self.part.at >= 1.0,
+        };
         io.put_some(self.running, runs);
-        io.put_some(self.at_speed, self.part.at >= 1.0);
+        io.put_some(self.at_speed, is_there);
         io.put_some(self.overload, self.has_tripped);
         io.put_some(self.healthy, !self.has_tripped);
         if let Some(speed) = self.speed {

@@ -184,6 +184,26 @@ fn a_motor_runs_up_trips_and_is_reset() {
 }
 
 #[test]
+fn a_motor_behind_a_drive_follows_its_target_while_it_runs() {
+    let mut machine = Machine::new(
+        "[[reply]]\nkind = \"motor\"\ncontactor = \"A\"\ntarget = \"N\"\nspeed = \"i\"\nat_speed = \"b\"\n\
+         start_time = \"100ms\"\nstop_time = \"50ms\"\nfull_speed = 50\n",
+    );
+    machine.set("N", 12.0);
+    assert_eq!(machine.values("i", 2), "0 0", "nothing switches it on");
+    machine.set("A", 1.0);
+    assert_eq!(machine.values("i", 4), "5 10 12 12");
+    assert_eq!(machine.value("b"), 1.0);
+    machine.set("N", 70.0);
+    assert_eq!(machine.values("b", 8), "0 0 0 0 0 0 0 1");
+    assert_eq!(machine.value("i"), 50.0, "a drive has no more than that");
+    machine.set("N", -3.0);
+    assert_eq!(machine.values("i", 6), "40 30 20 10 0 0");
+    machine.set("A", 0.0);
+    assert_eq!(machine.values("b", 2), "0 0", "it does not run");
+}
+
+#[test]
 fn a_cylinder_travels_between_its_switches_and_a_spring_brings_it_back() {
     let mut machine = Machine::new(
         "[[reply]]\nkind = \"cylinder\"\nextend = \"A\"\nextended = \"a\"\nretracted = \"b\"\nposition = \"j\"\n\

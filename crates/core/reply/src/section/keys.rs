@@ -71,6 +71,7 @@ pub const REPLY_KINDS: [TableKind; 12] = [
             "start_time",
             "stop_time",
             "full_speed",
+            "target",
             "trip",
             "reset",
         ],
@@ -226,7 +227,7 @@ pub const REPLY_KEYS: &[Key] = &[
     ),
     condition("contactor", "motor: what switches it on"),
     signal("running", "motor: on while the contactor is on"),
-    signal("at_speed", "motor: on at full speed"),
+    signal("at_speed", "motor: on at full speed, or at the speed of its target"),
     signal("speed", "motor: the speed"),
     signal("overload", "motor: on while the overload relay has tripped"),
     signal("healthy", "motor: off while the overload relay has tripped"),
@@ -282,7 +283,8 @@ pub const REPLY_KEYS: &[Key] = &[
     ),
     signal(
         "target",
-        "valve: the signal with the position to go to, in the place of commands",
+        "motor: the signal with the speed that a drive is told, up to full_speed; valve: the signal with the position to go \
+         to, in the place of commands",
     ),
     signal("opened", "valve: the switch at the open end"),
     signal("closed", "valve: the switch at the closed end"),

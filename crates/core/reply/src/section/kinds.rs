@@ -116,9 +116,13 @@ fn motor(reader: &Reader<'_>) -> Option<Behaviour> {
     let contact = delay(reader);
     let times = ["start_time", "stop_time"].map(|key| reader.time(key));
     let full_speed = reader.number("full_speed");
+    let target = reader.input("target", false);
     let (trip, reset) = (reader.levels("trip"), reader.levels("reset"));
     let sound = [
-        reader.needs("full_speed", "speed"),
+        match reader.get("target") {
+            None => reader.needs("full_speed", "speed"),
+            Some(_) => Some(()),
+        },
         reader.needs("reset", "trip"),
     ];
     let [running, at_speed, overload, healthy] = outputs;
@@ -129,6 +133,7 @@ fn motor(reader: &Reader<'_>) -> Option<Behaviour> {
         contact: contact?,
         rates: Rates::of(start_time?.unwrap_or_default(), stop_time?),
         full_speed: full_speed?.unwrap_or(100.0),
+        target: target?,
         trip: trip?,
         reset: reset?,
         running: running?,

@@ -33,6 +33,11 @@ fn main() -> ExitCode {
                 "pyprofibus_carries_requests_for_records_while_it_exchanges_data",
                 records,
             ),
+            #[cfg(unix)]
+            (
+                "pyprofibus_reads_the_weighing_terminal_of_examples_devices",
+                weighs,
+            ),
         ],
     )])
 }
@@ -101,6 +106,44 @@ fn exchanges() -> Result<(), Absent> {
         assert_eq!(last[12..14], *"80", "{told}");
         println!("{baud} baud, {module}: {}", told.trim());
     }
+    Ok(())
+}
+
+/// The IND570 of examples/devices: its weight, its indicator and its acknowledgement, as a PLC's program reads them.
+#[cfg(unix)]
+fn weighs() -> Result<(), Absent> {
+    let mut master = foreign::python_with("main", &["pyprofibus", "serial"])?;
+    let line = pty::Line::new();
+    let example = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/examples/devices/ind570/driver.cfg"
+    );
+    let text = std::fs::read_to_string(example).expect("an example");
+    let port = line.end(0).display().to_string();
+    // The master waits longer here than on a line.
+    let text = text.replace("/dev/ttyUSB0", &port).replace(
+        "baud    = 19200",
+        "baud    = 19200\nmax_tsdr = 16000\nmax_age = \"5s\"",
+    );
+    let folder = tempfile::tempdir().expect("a folder");
+    let gsd = folder.path().join("ind570.gsd");
+    let gsd = gsd.to_str().expect("UTF-8");
+    write_gsd(folder.path(), &text, gsd);
+    let mut machine = Machine::open(&text);
+    machine.until("it listens", |machine| {
+        statistic(&machine.driver, "device").is_some()
+    });
+    master.arg(concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/tests/peers/ind570.py"
+    ));
+    master.arg(line.end(1));
+    master.args(["19200", "3", gsd, "4 words in and out"]);
+    let told = machine.until_the_end_of(master, |machine| {
+        machine.set("Weight", 51.67);
+        machine.tick();
+    });
+    assert!(told.contains("ind570: ok weight=51.67"), "{told}");
     Ok(())
 }
 

@@ -34,16 +34,16 @@ freeze_mode=0
 group_mask=1
 watchdog_ms=5000
 module_0={module}
-output_size=4
-input_size=4
+output_size={size}
+input_size={size}
 diag_period=0
 """
 
 
-def open_master(arguments):
+def open_master(arguments, size=4):
     device, baud, address, gsd, module = arguments
     with tempfile.NamedTemporaryFile("w", suffix=".conf", delete=False) as file:
-        file.write(CONF.format(device=device, baud=baud, address=address, gsd=gsd, module=module))
+        file.write(CONF.format(device=device, baud=baud, address=address, gsd=gsd, module=module, size=size))
     try:
         conf = pyprofibus.PbConf.fromFile(file.name)
     finally:
@@ -109,4 +109,5 @@ def main():
     print(f"profibus_master: ok exchanges={exchanges} diagnoses={','.join(diagnoses)}")
 
 
-main()
+if __name__ == "__main__":
+    main()

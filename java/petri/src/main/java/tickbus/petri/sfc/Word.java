@@ -1,9 +1,11 @@
 package tickbus.petri.sfc;
 
 import java.util.ArrayList;
+import java.util.HashMap;
 import java.util.Iterator;
 import java.util.List;
 import java.util.Locale;
+import java.util.Map;
 import java.util.regex.Matcher;
 import java.util.regex.Pattern;
 import tickbus.petri.net.NetException;
@@ -18,7 +20,7 @@ import tickbus.petri.net.NetException;
  */
 record Word(String text, String written, int line, int column) {
     /** More would fill the memory. */
-    static final int MOST = 2_000_000;
+    static final int MOST = 4_000_000;
     private static final Pattern ONE = Pattern.compile(
         "(?<skip>\\s+|//[^\\n]*|\\(\\*(?s:.*?)\\*\\)|\\{[^}]*\\})"
             + "|%[A-Za-z]+[0-9.]+|(?:T|t|TIME|time)#[-0-9A-Za-z_.]+|16#[0-9A-Fa-f_]+|2#[01_]+|8#[0-7_]+|[0-9][0-9_]*(?:\\.[0-9]+)?"
@@ -48,6 +50,8 @@ record Word(String text, String written, int line, int column) {
         String text = String.join("", pieces.stream().map(Piece::text).toList());
         Matcher matcher = ONE.matcher(text);
         Places places = new Places(pieces);
+        // Most words come again and again.
+        Map<String, Word> known = new HashMap<>();
         int at = 0;
         while (at < text.length()) {
             places.goTo(text, at);
@@ -59,7 +63,8 @@ record Word(String text, String written, int line, int column) {
                 if (words.size() == MOST) {
                     throw new NetException(file, places.line, "", "column " + places.column(at) + ": more than " + MOST + " words");
                 }
-                words.add(of(matcher.group(), places.line, places.column(at)));
+                Word same = known.computeIfAbsent(matcher.group(), written -> of(written, 0, 0));
+                words.add(new Word(same.text, same.written, places.line, places.column(at)));
             }
             at = matcher.end();
         }

@@ -34,7 +34,7 @@ record XmlElement(String name, Map<String, String> attributes, List<XmlElement> 
         return children.stream().filter(one -> one.name.equals(named)).findFirst().orElse(null);
     }
 
-    /** Its own place as a word, for what the element stands for. */
+    /** A word at the place of this element. */
     Word word(String written) {
         return Word.of(written, line, column);
     }

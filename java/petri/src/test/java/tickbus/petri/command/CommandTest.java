@@ -18,6 +18,7 @@ import tickbus.petri.format.Pnml;
 import tickbus.petri.net.Delay;
 import tickbus.petri.net.NetBuilder;
 import tickbus.petri.net.PetriNet;
+import tickbus.petri.sfc.Sfc;
 
 class CommandTest {
     @TempDir
@@ -199,6 +200,25 @@ class CommandTest {
         assertTrue(err.contains("have no unit; they are taken as milliseconds"), err);
         assertEquals(2, run("", "draw", plain.toString(), "--unit", "1ms"));
         assertEquals(2, run("", "draw", plain.toString(), "--as", "apt"));
+    }
+
+    @Test
+    void aChartIsReadAndWrittenInBothForms() throws IOException {
+        Path mixer = Path.of("src/test/resources/sfc/mixer.xml");
+        assertEquals(0, run("", "analyse", mixer.toString(), "--require", "safe,live"), () -> err);
+        assertTrue(err.contains("conditions and actions of the chart are left out"), err);
+        Path text = folder.resolve("mixer.st");
+        assertEquals(0, run("", "draw", mixer.toString(), "--as", "sfc", "--out", text.toString()), () -> err);
+        assertEquals("", err);
+        assertEquals(0, run("", "draw", text.toString(), "--as", "plcopen"), () -> err);
+        assertEquals(Sfc.read(mixer).text(), Sfc.parse("written.xml", out).text());
+        Path plain = Files.writeString(folder.resolve("plain.pnml"), Pnml.write(PetriNet.named("plain").place("a", 1).place("b")
+            .transition("t").delay(Delay.fixed(3_000_000)).input("a").output("b").build()));
+        assertEquals(0, run("", "draw", plain.toString(), "--as", "sfc"), () -> err);
+        assertTrue(out.contains("TRANSITION t FROM a TO b := a.T >= T#3ms; END_TRANSITION"), out);
+        assertEquals(1, run("", "draw", net.toString(), "--as", "plcopen"));
+        assertTrue(err.contains("transition open: no input arc"), err);
+        assertEquals(2, run("", "draw", text.toString(), "--as", "sfc", "--unit", "1ms"));
     }
 
     @Test

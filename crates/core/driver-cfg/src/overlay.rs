@@ -3,7 +3,7 @@
 use super::Config;
 use super::timing::Line;
 use crate::{Options, PageOptions, loopback};
-use tickbus_base::toml_text::{Collector, Mistakes, Table, Value, did_you_mean, read_text, shown};
+use tickbus_base::toml_text::{Collector, Mistakes, Table, Value, did_you_mean, parse_text, shown};
 use tickbus_fieldbus::{At, Role};
 use tickbus_image::signal::SignalTable;
 use tickbus_record as record;
@@ -24,12 +24,7 @@ impl Config {
     ///
     /// Returns every mistake in the text.
     pub fn overlaid(self, origin: &str, text: &str) -> Result<Self, Mistakes> {
-        let mut collector = Collector::new(origin, text);
-        let config = read_text(&mut collector, text, |root| read(self, root));
-        match collector.finish() {
-            Some(mistakes) => Err(mistakes),
-            None => Ok(config.expect("what is not read has a mistake")),
-        }
+        parse_text(origin, text, |root| read(self, root))
     }
 }
 

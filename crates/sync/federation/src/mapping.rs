@@ -4,7 +4,7 @@ use std::path::Path;
 
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
-use tickbus_base::toml_text::{Collector, Mistakes, Table, load_text, read_text};
+use tickbus_base::toml_text::{Mistakes, Table, load_text, parse_text};
 use tickbus_image::signal::DataType;
 use tickbus_virtual_time::{Declaration, Variable};
 
@@ -95,8 +95,7 @@ impl<E: Engine> Mapping<E> {
     ///
     /// The same as for [`load`](Self::load).
     pub fn parse(file: &str, text: &str) -> Result<Self, Mistakes> {
-        let mut collector = Collector::new(file, text);
-        let read = read_text(&mut collector, text, |mut root| {
+        parse_text(file, text, |mut root| {
             let right = format!(
                 "write a [{}] table with client, publish and subscribe",
                 E::TABLE
@@ -104,11 +103,7 @@ impl<E: Engine> Mapping<E> {
             let engine = root.require(E::TABLE, &*right);
             root.finish();
             read(engine?.table(&format!("[{}]", E::TABLE), &right)?)
-        });
-        match collector.finish() {
-            Some(mistakes) => Err(mistakes),
-            None => Ok(read.expect("what is not read has a mistake")),
-        }
+        })
     }
 
     /// The declaration of the client.

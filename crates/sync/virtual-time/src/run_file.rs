@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use tickbus_base::time::Nanos;
-use tickbus_base::toml_text::{Collector, Mistakes, Table, Value, load_text, read_text};
+use tickbus_base::toml_text::{Mistakes, Table, Value, load_text, parse_text};
 
 use crate::declaration::{LONGEST_NAME, check_name};
 use crate::server::MOST_CLIENTS;
@@ -38,17 +38,12 @@ impl RunFile {
     ///
     /// The same as for [`load`](Self::load).
     pub fn parse(file: &str, text: &str, folder: &Path) -> Result<Self, Mistakes> {
-        let mut collector = Collector::new(file, text);
-        let read = read_text(&mut collector, text, |mut root| {
+        parse_text(file, text, |mut root| {
             let right = "write a [sync] table with step, clients and listen";
             let sync = root.require("sync", right);
             root.finish();
             read(sync?.table("[sync]", right)?, folder)
-        });
-        match collector.finish() {
-            Some(mistakes) => Err(mistakes),
-            None => Ok(read.expect("what is not read has a mistake")),
-        }
+        })
     }
 }
 

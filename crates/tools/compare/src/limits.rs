@@ -5,9 +5,7 @@ use std::fmt;
 use std::path::Path;
 
 use tickbus_base::time::Nanos;
-use tickbus_base::toml_text::{
-    Collector, Mistakes, Table, Value, load_text, nearest, read_text, shown,
-};
+use tickbus_base::toml_text::{Mistakes, Table, Value, load_text, nearest, parse_text, shown};
 
 use super::compared::{Compared, Outcome, SignalResult};
 use super::page::short;
@@ -100,12 +98,7 @@ impl Limits {
 
     /// Reads a text from `file`.
     fn parse(file: &str, text: &str) -> Result<Self, Mistakes> {
-        let mut collector = Collector::new(file, text);
-        let read = read_text(&mut collector, text, |root| Some(Self::read(file, root)));
-        match collector.finish() {
-            Some(mistakes) => Err(mistakes),
-            None => Ok(read.expect("what is not read has a mistake")),
-        }
+        parse_text(file, text, |root| Some(Self::read(file, root)))
     }
 
     fn read(file: &str, mut root: Table<'_>) -> Self {

@@ -5,7 +5,7 @@ use std::path::Path;
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{
-    Collector, Mistakes, Table, Value, did_you_mean, load_text, nearest, read_text, shown,
+    Mistakes, Table, Value, did_you_mean, load_text, nearest, parse_text, shown,
 };
 use tickbus_compare::{self as compare, Budget, Parameter, Side};
 use tickbus_image::signal::Area;
@@ -56,12 +56,7 @@ impl FitFile {
     /// With every mistake in the file.
     pub fn load(path: &Path, model: &Model) -> Result<Self, Mistakes> {
         let text = load_text(path)?;
-        let mut collector = Collector::new(&path.display().to_string(), &text);
-        let read = read_text(&mut collector, &text, |root| read(root, model));
-        match collector.finish() {
-            Some(mistakes) => Err(mistakes),
-            None => Ok(read.expect("what is not read has a mistake")),
-        }
+        parse_text(&path.display().to_string(), &text, |root| read(root, model))
     }
 
     /// The machine with these commands, as a model whose parameters a fit changes.

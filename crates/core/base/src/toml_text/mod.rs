@@ -1,6 +1,6 @@
 //! Reading configuration text: spans, collected mistakes, nearest names.
 //!
-//! [`read_text`] parses TOML and passes its root [`Table`] on. A reader takes the keys one by one and reports each
+//! [`read_text`] parses TOML and passes its root [`Table`] on, and [`parse_text`] returns all mistakes. A reader takes the keys one by one and reports each
 //! mistake to the text's [`Collector`] at its position, so that the user sees all of them at once. Nothing here knows
 //! the meaning of the keys.
 
@@ -16,5 +16,5 @@ pub use key::{Key, RequiredKey, Shape, TableKind, kind_names, names};
 pub use mistakes::{Collector, Mistakes, PlacedMistake, printable, shown};
 pub use nearest::{did_you_mean, nearest};
 pub use number::short_number;
-pub use source::{load_text, read_text};
+pub use source::{load_text, parse_text, read_text};
 pub use table::{Table, Value};

@@ -74,6 +74,28 @@ pub fn load_text(path: &Path) -> Result<String, Mistakes> {
     })
 }
 
+/// Reads the whole `text` of `file`: what `read` makes of its root table.
+///
+/// # Errors
+///
+/// Every mistake in the text.
+///
+/// # Panics
+///
+/// When `read` returns `None` without having reported a mistake.
+pub fn parse_text<T>(
+    file: &str,
+    text: &str,
+    read: impl FnOnce(Table<'_>) -> Option<T>,
+) -> Result<T, Mistakes> {
+    let mut collector = Collector::new(file, text);
+    let read = read_text(&mut collector, text, read);
+    match collector.finish() {
+        Some(mistakes) => Err(mistakes),
+        None => Ok(read.expect("what is not read has a mistake")),
+    }
+}
+
 /// Reads `text` and hands its root table to `read`.
 ///
 /// Syntax errors are reported to `collector`, one per line, and their lines are left out: `read` sees the

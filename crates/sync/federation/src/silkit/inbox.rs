@@ -1,4 +1,4 @@
-//! What the library's thread reports, for the thread of the run.
+//! Reports of the library's thread, for the thread of the run.
 
 use std::collections::BTreeMap;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -50,7 +50,7 @@ impl Slot {
     }
 }
 
-/// What has been reported.
+/// The reports so far.
 #[derive(Debug)]
 pub(super) struct Inbox {
     name: String,

@@ -3,8 +3,7 @@
 use std::path::Path;
 
 use tickbus_base::toml_text::{
-    Collector, Mistakes, Table, Value as TomlValue, did_you_mean, load_text, nearest, read_text,
-    shown,
+    Mistakes, Table, Value as TomlValue, did_you_mean, load_text, nearest, parse_text, shown,
 };
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::faults::unknown;
@@ -48,14 +47,9 @@ impl Map {
     /// variables that cannot be signals; directions that do not match.
     pub fn load(path: &Path, model: &mut Model, config: &Config) -> Result<Self, Mistakes> {
         let text = load_text(path)?;
-        let mut collector = Collector::new(&path.display().to_string(), &text);
-        let map = read_text(&mut collector, &text, |root| {
+        parse_text(&path.display().to_string(), &text, |root| {
             Some(read(root, model, config))
-        });
-        match collector.finish() {
-            Some(mistakes) => Err(mistakes),
-            None => Ok(map.expect("what is not read has a mistake")),
-        }
+        })
     }
 }
 

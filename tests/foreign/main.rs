@@ -9,9 +9,9 @@ mod bridge_bus;
 #[cfg(unix)]
 #[path = "../peers/commands.rs"]
 mod commands;
+mod devices;
 #[path = "../it/fmi/fixture.rs"]
 mod fixture;
-mod devices;
 mod fmi;
 mod gateway;
 mod harness;

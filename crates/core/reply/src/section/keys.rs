@@ -227,7 +227,10 @@ pub const REPLY_KEYS: &[Key] = &[
     ),
     condition("contactor", "motor: what switches it on"),
     signal("running", "motor: on while the contactor is on"),
-    signal("at_speed", "motor: on at full speed, or at the speed of its target"),
+    signal(
+        "at_speed",
+        "motor: on at full speed, or at the speed of its target",
+    ),
     signal("speed", "motor: the speed"),
     signal("overload", "motor: on while the overload relay has tripped"),
     signal("healthy", "motor: off while the overload relay has tripped"),

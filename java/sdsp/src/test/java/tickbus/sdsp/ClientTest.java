@@ -104,7 +104,7 @@ class ClientTest {
         Events events = new Events();
         try (FakeServer server = new FakeServer(s -> {
             ByteBuffer join = s.receive();
-            assertEquals(2, join.getShort(5));
+            assertEquals(4, join.getShort(5));
             assertEquals(1, join.getInt(7));
             assertEquals(20_000_000, join.getLong(11));
             s.send(0x85, FakeServer.buffer(50).put("\"plc\" to join".getBytes(UTF_8)));

@@ -33,7 +33,7 @@ pub struct Client {
     read_types: Vec<DataType>,
     reads: Vec<u64>,
     waits_for: String,
-    /// What the server wants to do with the state.
+    /// The request of the server about the state.
     state: Option<Stated>,
     out: Vec<u8>,
 }

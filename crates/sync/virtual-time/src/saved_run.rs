@@ -207,12 +207,11 @@ impl SavedRun {
         for _ in 0..u16::from_le_bytes(reader.take()?) {
             let declaration = read_declared(&mut reader, true)?;
             let next = reader.word()?;
-            let state = match reader.byte()? {
-                0 => None,
-                _ => {
-                    let length = reader_count(&mut reader)?;
-                    Some(reader.bytes(length)?.to_vec())
-                }
+            let state = if reader.byte()? == 0 {
+                None
+            } else {
+                let length = reader_count(&mut reader)?;
+                Some(reader.bytes(length)?.to_vec())
             };
             clients.push(ClientState {
                 declaration,

@@ -145,7 +145,7 @@ pub enum FromServer<'a> {
         sequence: u64,
         /// The values that the client had written.
         writes: Slots<'a>,
-        /// Its state.
+        /// The state.
         state: &'a [u8],
     },
 }

@@ -232,8 +232,7 @@ impl Server<'_> {
     /// The run has ended: what was not saved is never saved.
     pub(super) fn end_of_saving(&mut self) {
         let at = self.saving.at.take();
-        if let Some(collecting) = self.saving.collecting.take() {
-            drop(collecting);
+        if self.saving.collecting.take().is_some() {
             let why = "the run ended while its clients were asked for their states";
             self.saving.saved = Some(Err(why.to_owned()));
         } else if let Some(at) = at {
@@ -253,7 +252,7 @@ mod tests {
 
     /// Sums up, and can save that.
     struct Sum {
-        sum: u64,
+        total: u64,
         steps: u64,
         saves: bool,
     }
@@ -270,14 +269,14 @@ mod tests {
         fn initial(&mut self, _: &mut [u64]) {}
 
         fn run(&mut self, step: Step, _: &[u64], writes: &mut [u64]) -> Result<(), String> {
-            self.sum += step.sequence;
+            self.total += step.sequence;
             self.steps += 1;
-            writes[0] = self.sum;
+            writes[0] = self.total;
             Ok(())
         }
 
         fn save(&mut self) -> Result<Vec<u8>, String> {
-            let state = self.sum.to_le_bytes().to_vec();
+            let state = self.total.to_le_bytes().to_vec();
             self.saves
                 .then_some(state)
                 .ok_or_else(|| "it keeps\nno sum".to_owned())
@@ -285,14 +284,14 @@ mod tests {
 
         fn restore(&mut self, state: &[u8]) -> Result<(), String> {
             let state = state.try_into().map_err(|_| "no sum".to_owned())?;
-            self.sum = u64::from_le_bytes(state);
+            self.total = u64::from_le_bytes(state);
             Ok(())
         }
     }
 
     fn run(settings: Settings, saves: bool) -> (Result<Outcome, crate::Ended>, u64) {
         let mut sum = Sum {
-            sum: 0,
+            total: 0,
             steps: 0,
             saves,
         };

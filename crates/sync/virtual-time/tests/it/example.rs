@@ -156,8 +156,6 @@ fn any_bit_that_flips_changes_the_hash_or_ends_the_run_with_a_reason() {
                     // The multiple in a run of one step is part of the hash; the client's reads are not.
                     let has_no_effect = match (number, bit / 8) {
                         (0 | 1, byte) if byte > length - 6 => true,
-                        // Version 3, whose join is that of version 2.
-                        (1, 9) if bit % 8 == 0 => true,
                         // The PLC's multiple, which its interval replaces; the step after the last one.
                         (1, 11..15) | (5, 13..21) => true,
                         _ => false,

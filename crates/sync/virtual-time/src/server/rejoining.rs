@@ -176,7 +176,7 @@ impl Server<'_> {
         if memory.bytes() > most && rejoining.away.is_empty() {
             rejoining.memory = None;
             let what = match (rejoining.limit, rejoining.saves) {
-                (None, _) => "the run cannot be saved",
+                (None, _) => "the run can be saved only with the states of all clients",
                 (Some(_), false) => "no member can come back any more",
                 (Some(_), true) => "no member can come back any more, and the run cannot be saved",
             };

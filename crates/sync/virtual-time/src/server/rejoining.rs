@@ -178,7 +178,9 @@ impl Server<'_> {
             let what = match (rejoining.limit, rejoining.saves) {
                 (None, _) => "the run can be saved only with the states of all clients",
                 (Some(_), false) => "no member can come back any more",
-                (Some(_), true) => "no member can come back any more, and the run cannot be saved",
+                (Some(_), true) => {
+                    "no member can come back any more, and the run can be saved only with the states of all clients"
+                }
             };
             self.news.push_back(format!(
                 "after step {step} {what}: the memory of the run is full ({} MiB)",

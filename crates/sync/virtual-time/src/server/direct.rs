@@ -97,8 +97,12 @@ impl Server<'_> {
 
     /// True if clients have run, or may run, steps that the server has not followed yet.
     pub(super) fn has_run_ahead(&self) -> bool {
-        let until = self.allowed.as_ref().map_or(0, Allowed::until);
-        self.step().is_some_and(|step| until > step.sequence)
+        self.step().is_some_and(|step| self.until() > step.sequence)
+    }
+
+    /// The last step that the clients may run without the server.
+    pub(super) fn until(&self) -> u64 {
+        self.allowed.as_ref().map_or(0, Allowed::until)
     }
 
     /// The client at `seat` listens at `address`.

@@ -1,6 +1,5 @@
 //! The messages that are to be sent.
 
-use super::direct::Allowed;
 use super::{Phase, Seat, Server, ToClient};
 use crate::Ended;
 
@@ -65,7 +64,7 @@ impl Server<'_> {
                 // The client of another seat has left in the meantime; a new token makes this one forget the meeting.
                 None => ToClient::Meet(0),
             },
-            (Out::Until(_), ..) => ToClient::Until(self.allowed.as_ref().map_or(0, Allowed::until)),
+            (Out::Until(_), ..) => ToClient::Until(self.until()),
             (Out::Save(_, step), ..) => ToClient::Save(step),
             (Out::Restore(_), Phase::Running(barrier, _), Seat::Back(client)) => {
                 self.rejoining.state(client, barrier)

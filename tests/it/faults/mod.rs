@@ -411,6 +411,17 @@ fn a_delay_counts_ticks_of_a_stepped_bus() {
 }
 
 #[test]
+fn a_kind_is_still_read_by_its_former_name_and_logged_once() {
+    logged::expect("\"slow-answers\" is called \"values-late\" now");
+    for _ in 0..2 {
+        let mut bus = Stepped::new(
+            "[[fault]]\nkind = \"slow-answers\"\nby = \"20ms\"\ntick = 3\nticks = 4\n",
+        );
+        assert_eq!(bus.count(9), [0.0, 1.0, 1.0, 1.0, 2.0, 3.0, 6.0, 7.0, 8.0]);
+    }
+}
+
+#[test]
 fn lost_frames_are_lost_with_their_pulses_and_the_same_seed_loses_the_same() {
     let run = |seed: u32| {
         let mut bus = Stepped::new(&format!(

@@ -279,7 +279,7 @@ impl Signals {
         Ok(Judged::All([(variable.signal, bits)]))
     }
 
-    /// Writes what may be written.
+    /// Writes the values that were accepted.
     fn carry_out(
         &self,
         context: &RequestContext,

@@ -50,7 +50,7 @@ impl Places {
     ///
     /// # Errors
     ///
-    /// A mistake in that address space, with the offset in the driver.cfg of what is not in it.
+    /// A mistake in that address space, with the offset of the line in the driver.cfg that it concerns.
     pub(super) fn new(
         options: &ServerOptions,
         table: &SignalTable,
@@ -147,7 +147,7 @@ impl Places {
         let is_bound = self.targets[signal].is_some();
         let signal = &table.signals[signal];
         let name = format!("{}{SCALED}", signal.name);
-        // A signal of that name takes precedence. The maker's variables have what the maker gave them.
+        // A signal of that name takes precedence. Nothing is added to the maker's variables.
         let scale = signal
             .scale
             .filter(|_| !is_bound)

@@ -57,13 +57,13 @@ impl ServerOptions {
         report_unplaced(lines, table);
     }
 
-    /// Reports places that two signals share of which this end writes one.
+    /// Reports two signals in one place, unless this end only reads both.
     fn report_overlaps(&self, placed: &[Placed<'_, '_>], table: &SignalTable) {
-        // The place that reaches furthest so far, and the one of those that this end writes.
+        // The places that reach furthest so far: of all signals, and of those that this end writes.
         let mut furthest: [Option<&Placed<'_, '_>>; 2] = [None, None];
         for next in placed {
             let sends = self.sends(table, next);
-            // What this end writes must not meet anything; what it reads must not meet what it writes.
+            // A written signal must not overlap with any other; read signals may overlap with each other.
             let others = if sends { &furthest[..] } else { &furthest[1..] };
             let meets = |other: &&Placed<'_, '_>| {
                 (other.cpu, other.object) == (next.cpu, next.object) && next.first < other.end

@@ -76,7 +76,7 @@ pub(super) struct PlacedObject {
     /// The station that is the CPU with this object; `None` for an object that every client finds.
     pub(super) cpu: Option<usize>,
     pub(super) object: Object,
-    /// The station to which requests for bytes without a signal count.
+    /// The station that requests for bytes without a signal count for.
     pub(super) owner: usize,
     /// The contents. Bytes without a signal keep what clients write.
     pub(super) bytes: Box<[u8]>,
@@ -154,7 +154,7 @@ pub(super) fn objects(options: &ServerOptions, table: &SignalTable) -> Vec<Place
         let length = match placed.object {
             Object::Flags => options.flags,
             Object::Block(number) => {
-                // Several stations can have the block in common, and any of them its length.
+                // Several stations can share the block, and each can state its length.
                 let stations = 0..table.stations.len();
                 let sharers = stations.filter(|station| options.cpu(table, *station) == placed.cpu);
                 let lengths = sharers.flat_map(|station| options.lengths_of(table, station));

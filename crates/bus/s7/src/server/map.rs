@@ -23,7 +23,7 @@ pub(super) enum Place {
     Area(AreaRange),
     /// Memory of its own: the position in the list of [placed objects](super::layout::objects).
     Object(usize),
-    /// The scratch memory that the flags of all other stations are.
+    /// The scratch memory, which the flags of all other stations share.
     Scratch,
 }
 
@@ -34,8 +34,8 @@ pub(super) struct Map {
     blocks: Vec<(u16, AreaRange)>,
     /// The objects of placed stations, in the order of the list.
     objects: Vec<(Option<usize>, Object)>,
-    /// The data blocks of each station and their lengths, for clients that ask; last those for a client that connects to
-    /// no station.
+    /// The data blocks of each station and their lengths, for clients that ask. The last entry is for clients that connect
+    /// to no station.
     lengths: Vec<Vec<(u16, usize)>>,
     stations: Vec<Cpu>,
 }
@@ -86,7 +86,7 @@ impl Map {
                 .iter()
                 .filter(|placed| placed.cpu.is_none() || placed.cpu == station);
             let found = found.filter_map(|placed| match placed.object {
-                // The CPU's own hides a common one.
+                // A block of the CPU takes precedence over one that all CPUs share.
                 Object::Block(number) => Some((number, placed.cpu.is_none(), placed.bytes.len())),
                 _ => None,
             });
@@ -129,7 +129,7 @@ impl Map {
         object: Object,
         station: Option<usize>,
     ) -> Result<Place, ReturnCode> {
-        // The image of a station that is not placed hides what others have in common.
+        // The image of a station without lines takes precedence over objects that other stations share.
         let has_image = station.is_some_and(|station| !self.stations[station].is_placed)
             && matches!(object, Object::Inputs | Object::Outputs);
         let common = (!has_image).then_some(None);

@@ -83,7 +83,7 @@ pub(super) struct Jobs<'a> {
 impl Jobs<'_> {
     /// The job addresses something of a station.
     fn address(&mut self, station: usize, function: u8) -> Result<(), ReturnCode> {
-        // A fault with a chance meets the whole job or nothing of it.
+        // A fault with a chance applies to the whole job or not at all.
         let known = self.refusals.iter().find(|(of, _)| *of == station);
         let known = known.map(|(_, code)| *code);
         let code = known.unwrap_or_else(|| {
@@ -174,7 +174,7 @@ impl Jobs<'_> {
                 if parts.is_empty() {
                     self.check_up(owner)?;
                 }
-                // Two signals can have the same bits of the object, and not of a frame.
+                // Two signals can share bits of the object, but never bits of a frame.
                 let base = at * OBJECT_BITS;
                 for part in &parts {
                     self.check_up(part.station)?;

@@ -117,7 +117,7 @@ struct Client {
     writer: Writer,
     /// Per station, whether its requests keep the values young.
     renewals: Box<[Renewal]>,
-    /// For what answers to it carry.
+    /// The receipts for the values in the answers to it.
     receipts: Vec<Receipt>,
 }
 
@@ -155,7 +155,7 @@ impl tcp::Service for Service {
             client.receipts.clear();
         }
         let begin = reply.len();
-        // A fault that begins meanwhile meets all jobs of the packet or none.
+        // A fault that begins during the packet applies to all of its jobs or to none.
         port.together(|port| {
             let station = self.memory.map.station_of(client.conversation.called());
             let facts = &self.facts[station.unwrap_or_default()];
@@ -186,8 +186,8 @@ impl tcp::Service for Service {
     }
 
     fn replied(&mut self, client: &mut Client, port: &mut Port) {
-        // While a fault held the answer back, another client may have taken newer values: what this one has of them is
-        // unknown, and is sent again.
+        // While a fault held the answer back, another client may have taken newer values. This client may have got
+        // some of them or none, so they are sent again.
         let batch = self.memory.batch;
         let is_newest = batch.is_some_and(|(number, _)| number == client.number);
         for receipt in client.receipts.drain(..) {

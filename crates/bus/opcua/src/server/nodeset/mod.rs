@@ -352,7 +352,7 @@ fn heads(root: Node<'_, '_>) -> (Vec<String>, Vec<String>) {
     (uris.collect(), requires.map(str::to_owned).collect())
 }
 
-/// A tag in whatever XML namespace: files differ.
+/// A tag in any XML namespace, because files differ.
 trait TagName {
     fn has_tag_name_of(&self, name: &str) -> bool;
 }

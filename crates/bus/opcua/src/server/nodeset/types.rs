@@ -43,7 +43,7 @@ pub(crate) struct Types {
 }
 
 impl Types {
-    /// Takes what one node says about data types.
+    /// Adds the facts about data types that one node has.
     pub(crate) fn take(&mut self, item: &ImportedItem) {
         let id = item.node.node_id();
         let is_type = item.node.node_class() == NodeClass::DataType;

@@ -1,4 +1,4 @@
-//! The values of standard nodes that tell of the server as it is.
+//! The values of standard nodes that describe the current state of the server.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;

@@ -32,7 +32,7 @@ fn decode(table: &[u8], time: DateTime, mut take: impl FnMut(ImportedItem)) {
     }
 }
 
-/// The context of the encoding. The limits, which are for what strangers send, are lifted.
+/// The context of the encoding. It has no limits, which are for data from the network.
 fn context() -> ContextOwned {
     let options = DecodingOptions {
         max_byte_string_length: usize::MAX,

@@ -8,6 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use async_trait::async_trait;
 use opcua::core::sync::RwLock;
 use opcua::types::{AttributeId, DataValue, NodeId, NumericRange, StatusCode, TimestampsToReturn};
+use opcua_server::CreateMonitoredItem;
 use opcua_server::address_space::{AddressSpace, NodeType};
 use opcua_server::diagnostics::NamespaceMetadata;
 use opcua_server::node_manager::memory::{InMemoryNodeManager, InMemoryNodeManagerImpl};
@@ -15,20 +16,20 @@ use opcua_server::node_manager::{
     MethodCall, MonitoredItemRef, MonitoredItemUpdateRef, ParsedReadValueId, ParsedWriteValue,
     RequestContext, ServerContext, WriteNode,
 };
-use opcua_server::{CreateMonitoredItem, MonitoredItemHandle, Subscription};
 use tokio::sync::oneshot;
 
 use crate::pki::date;
 use crate::reactor::Inbox;
 use crate::{application, values};
-use tickbus_base::time::{Nanos, WallClock};
+use tickbus_base::time::WallClock;
 use tickbus_image::signal::{Area, SignalTable};
 
 use super::SESSIONS;
+use super::sampling::{millis, publishing, rhythm};
 use super::space::Places;
 use super::verdict::Verdict;
 use super::visitor::Visitor;
-use super::watched::{Rhythm, Variable, Watched};
+use super::watched::{Variable, Watched};
 use super::whole::Written;
 use super::writers::Writers;
 use crate::namespaces::FIRST;
@@ -514,41 +515,4 @@ fn namespaces(uris: &[String]) -> Vec<NamespaceMetadata> {
         ..NamespaceMetadata::default()
     });
     all.collect()
-}
-
-/// The rhythm of an item with a sampling interval in milliseconds and a queue. With a queue the client sees
-/// every sample, without one the value at the time of publishing.
-fn rhythm(sampling: f64, queue: usize, publishing: Nanos) -> Rhythm {
-    let sampling = millis(sampling);
-    let span = if queue > 1 {
-        sampling
-    } else {
-        sampling.max(publishing)
-    };
-    Rhythm { sampling, span }
-}
-
-/// The publishing interval of the subscription that an item belongs to.
-fn publishing(context: &RequestContext, item: MonitoredItemHandle) -> Nanos {
-    let of_session = context
-        .subscriptions
-        .get_session_subscriptions(context.session_id);
-    of_session.map_or(Nanos::ZERO, |of_session| {
-        let of_session = of_session.lock();
-        let interval = of_session
-            .get(item.subscription_id)
-            .map(Subscription::publishing_interval);
-        interval.map_or(Nanos::ZERO, |interval| {
-            Nanos(i64::try_from(interval.as_nanos()).unwrap_or(i64::MAX))
-        })
-    })
-}
-
-/// A span in milliseconds; a negative one means the publishing interval.
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "a sampling interval, in nanoseconds"
-)]
-fn millis(millis: f64) -> Nanos {
-    Nanos((millis.max(0.0) * 1e6) as i64)
 }

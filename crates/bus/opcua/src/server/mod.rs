@@ -6,6 +6,7 @@ mod manager;
 mod nodeset;
 mod parts;
 mod peers;
+mod sampling;
 mod setup;
 mod space;
 mod standard;

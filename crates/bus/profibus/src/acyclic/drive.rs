@@ -1,5 +1,5 @@
-//! The parameters of a drive, as PROFIdrive has them: record 47 takes a request for several parameters, and then has the
-//! answer.
+//! The parameters of a drive, as the profile of drives has them: record 47 takes a request for several parameters, and
+//! then has the answer.
 
 use super::RECORD_LIMIT;
 use super::machine::Machine;
@@ -157,17 +157,12 @@ pub(super) fn serve(
             read(&address, all, first, room, machine, &mut blocks)
         } else if is_lost {
             Err(Wrong::UnknownFormat)
+        } else if let Some(new) = take(&mut values)? {
+            change(&address, new, all, first, machine).map(|()| blocks.extend([ZERO, 0]))
         } else {
-            match take(&mut values)? {
-                Some(new) => {
-                    change(&address, new, all, first, machine).map(|()| blocks.extend([ZERO, 0]))
-                }
-                None => {
-                    // The values behind those of an unknown length cannot be found.
-                    is_lost = true;
-                    Err(Wrong::UnknownFormat)
-                }
-            }
+            // The values behind those of an unknown length cannot be found.
+            is_lost = true;
+            Err(Wrong::UnknownFormat)
         };
         if let Err(why) = served {
             has_failed = true;

@@ -1,5 +1,6 @@
 //! Writes the GSD file of a user's own machine.
 
+use crate::acyclic::Acyclic;
 use crate::configuration::{SlotModule, hex};
 use crate::rates::{RATES, SLOT_TIME_LIMIT};
 use crate::station::Identity;
@@ -103,25 +104,8 @@ impl Machine<'_> {
         line("Min_Slave_Intervall=10");
         line(&format!("Max_Diag_Data_Len={DATA_LIMIT}"));
         line("Slave_Family=3");
-        if acyclic.is_any() {
-            // The octets of DPV1; the first enables the acyclic services.
-            line("User_Prm_Data_Len=3");
-            line("Ext_User_Prm_Data_Const(0)=0x80,0x00,0x00");
-            line("Max_User_Prm_Data_Len=3");
-            line("DPV1_Slave=1");
-            line("WD_Base_1ms_supp=1");
-            line("C1_Read_Write_supp=1");
-            line(&format!("C1_Max_Data_Len={}", acyclic.room()));
-            // In units of 10 ms.
-            line(&format!("C1_Response_Timeout={RESPONSE}"));
-            line("C2_Read_Write_supp=1");
-            line(&format!("C2_Max_Data_Len={}", acyclic.room()));
-            line(&format!("C2_Response_Timeout={RESPONSE}"));
-            line(&format!("C2_Max_Count_Channels={}", acyclic.connections));
-            line(&format!("Max_Initiate_PDU_Length={DATA_LIMIT}"));
-            line("Ident_Maintenance_supp=1");
-        } else {
-            line("User_Prm_Data_Len=0");
+        for text in services(acyclic) {
+            line(&text);
         }
         line("Modular_Station=1");
         let most = |of: fn(&Identity) -> usize| {
@@ -175,6 +159,31 @@ impl Machine<'_> {
             (is_feasible || rate.baud == self.baud).then_some((rate.name, wait))
         })
     }
+}
+
+/// The lines about the parameters, and the services that these switch on.
+fn services(acyclic: &Acyclic) -> Vec<String> {
+    if !acyclic.is_any() {
+        return vec!["User_Prm_Data_Len=0".to_owned()];
+    }
+    let room = acyclic.room();
+    vec![
+        // The octets of DPV1; the first enables the acyclic services.
+        "User_Prm_Data_Len=3".to_owned(),
+        "Ext_User_Prm_Data_Const(0)=0x80,0x00,0x00".to_owned(),
+        "Max_User_Prm_Data_Len=3".to_owned(),
+        "DPV1_Slave=1".to_owned(),
+        "WD_Base_1ms_supp=1".to_owned(),
+        "C1_Read_Write_supp=1".to_owned(),
+        format!("C1_Max_Data_Len={room}"),
+        format!("C1_Response_Timeout={RESPONSE}"),
+        "C2_Read_Write_supp=1".to_owned(),
+        format!("C2_Max_Data_Len={room}"),
+        format!("C2_Response_Timeout={RESPONSE}"),
+        format!("C2_Max_Count_Channels={}", acyclic.connections),
+        format!("Max_Initiate_PDU_Length={DATA_LIMIT}"),
+        "Ident_Maintenance_supp=1".to_owned(),
+    ]
 }
 
 /// The name of the `number`th module of a file.
@@ -315,5 +324,34 @@ mod tests {
             .iter()
             .map(|module| (module.name.clone(), module.identifiers.clone()));
         assert!(modules.eq(ours));
+    }
+
+    #[test]
+    fn a_machine_with_records_says_so_and_both_parsers_read_it() {
+        let mut machine = machine();
+        for (.., identity) in &mut machine.stations {
+            identity.acyclic = Acyclic {
+                class_1: true,
+                connections: 2,
+                ..Acyclic::default()
+            };
+        }
+        let written = machine.write();
+        let own = Gsd::read(written.as_bytes()).expect("a right file");
+        assert!(own.dpv1 && own.c1_read_write && own.c2_read_write);
+        assert_eq!(
+            (own.c1_max_data, own.c2_max_data, own.c2_channels),
+            (240, 240, 2)
+        );
+        let read = own.identity(&["1 word in".to_owned()]).expect("a module");
+        assert_eq!(read.user.defaults(), [0x80, 0, 0]);
+        let acyclic = read.acyclic;
+        assert_eq!(
+            (acyclic.class_1, acyclic.connections, acyclic.room()),
+            (true, 2, 240)
+        );
+        assert_eq!(acyclic.nameplate.order, "Cell _4_, S_d");
+        let theirs = gsd_parser::parser::parse(std::path::Path::new("x.gsd"), &written);
+        assert_eq!(theirs.expect("they read it").ident_number, 0x80E0);
     }
 }

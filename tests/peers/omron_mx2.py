@@ -66,8 +66,8 @@ def main():
     until("it is reset", lambda: not coil(Coil.Alarm))
     until("it has its speed again", lambda: coil(Coil.ConstantSpeedReached))
 
-    drive.write_in_coils(Coil.OperationCommand, [False, True])
-    until("it stands", lambda: coil(Coil.ZeroHzDetection))
+    drive.write_in_coil(Coil.OperationCommand, False)
+    until("it has stopped", lambda: coil(Coil.ZeroHzDetection))
 
     # What the manual has as read-only, and what the inverter does not have.
     for refused in (

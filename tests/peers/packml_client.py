@@ -72,6 +72,8 @@ async def main():
 
         for command, wanted in COURSE:
             on = {"Abort": top, "Clear": top, "Stop": middle}.get(command, inner)
+            if command == "Reset" and await ends("Stopped"):
+                on = middle
             await on.call_method(f"{index}:{command}")
             await until(f"{command} ends in {wanted}", lambda: ends(wanted))
             if command == "Start":

@@ -248,7 +248,8 @@ final class SfcReader {
     }
 
     private static String text(List<Word> steps) {
-        return String.join(", ", steps.stream().map(Word::written).toList());
+        return String.join(", ", steps.stream().limit(MOST_NAMES_SHOWN).map(Word::written).toList())
+            + (steps.size() > MOST_NAMES_SHOWN ? ", …" : "");
     }
 
     private List<Word> stepList() {

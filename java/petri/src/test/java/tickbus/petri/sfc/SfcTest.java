@@ -132,6 +132,22 @@ class SfcTest {
     }
 
     @Test
+    void aTransitionToManyStepsHasAShortName() {
+        StringBuilder steps = new StringBuilder();
+        StringBuilder names = new StringBuilder("s0");
+        for (int i = 0; i < 10_000; i++) {
+            steps.append("STEP s").append(i).append(": END_STEP ");
+            names.append(i == 0 ? "" : ", s" + i);
+        }
+        Sfc chart = Sfc.parse("c.st", "PROGRAM c INITIAL_STEP a: END_STEP " + steps + "TRANSITION FROM a TO (" + names
+            + ") := TRUE; END_TRANSITION TRANSITION FROM (" + names + ") TO a := TRUE; END_TRANSITION END_PROGRAM");
+        assertTrue(chart.net().transition(0).name().endsWith("s18, s19, …"), chart.net().transition(0).name());
+        SfcController run = chart.start();
+        assertEquals("1 1", run.scan(0) + " " + run.scan(1));
+        assertEquals(chart.net().arcs().size(), Sfc.parse("c.xml", chart.plcopen()).net().arcs().size());
+    }
+
+    @Test
     void largeFilesAndLongNamesAreRefused(@TempDir Path folder) throws Exception {
         assertMistake("STEP fill", "STEP f" + "i".repeat(200), "tank.st:5: column 8: a name of 201 characters; expected at most 200");
         assertMistake("valve(N);", ";".repeat(4_000_000), "tank.st:5: column 3999983: more than 4000000 words");

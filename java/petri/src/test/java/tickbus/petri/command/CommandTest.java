@@ -213,9 +213,9 @@ class CommandTest {
         assertEquals(0, run("", "draw", text.toString(), "--as", "plcopen"), () -> err);
         assertEquals(Sfc.read(mixer).text(), Sfc.parse("written.xml", out).text());
         Path plain = Files.writeString(folder.resolve("plain.pnml"), Pnml.write(PetriNet.named("plain").place("a", 1).place("b")
-            .transition("t").delay(Delay.fixed(3_000_000)).input("a").output("b").build()));
+            .transition("go").delay(Delay.fixed(3_000_000)).input("a").output("b").build()));
         assertEquals(0, run("", "draw", plain.toString(), "--as", "sfc"), () -> err);
-        assertTrue(out.contains("TRANSITION t FROM a TO b := a.T >= T#3ms; END_TRANSITION"), out);
+        assertTrue(out.contains("TRANSITION go FROM a TO b := a.T >= T#3ms; END_TRANSITION"), out);
         assertEquals(1, run("", "draw", net.toString(), "--as", "plcopen"));
         assertTrue(err.contains("transition open: no input arc"), err);
         assertEquals(2, run("", "draw", text.toString(), "--as", "sfc", "--unit", "1ms"));

@@ -218,7 +218,7 @@ impl Client {
         wire::done(&mut self.out, sequence, next, writes);
     }
 
-    /// Makes the frame with the state after the step `sequence`, or why there is none.
+    /// Makes the frame with the state after the step `sequence`, or the reason why the client gives none.
     fn saved(&mut self, sequence: u64, state: Result<Vec<u8>, String>) {
         let state = state.and_then(|state| match state.len() {
             0..=wire::LONGEST_STATE => Ok(state),

@@ -201,8 +201,8 @@ impl SavedRun {
         }
         let length_of_trace = reader_count(&mut reader)?;
         let trace = reader.bytes(length_of_trace)?;
-        let trace =
-            postcard::from_bytes(trace).map_err(|_| "has a trace that is none".to_owned())?;
+        let trace = postcard::from_bytes(trace)
+            .map_err(|_| "has a trace that cannot be read".to_owned())?;
         let mut clients: Vec<ClientState> = Vec::new();
         for _ in 0..u16::from_le_bytes(reader.take()?) {
             let declaration = read_declared(&mut reader, true)?;

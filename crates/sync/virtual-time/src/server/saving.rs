@@ -28,7 +28,7 @@ pub(super) struct Saving {
 struct Collecting {
     /// The seats of those that have not answered.
     missing: BTreeSet<usize>,
-    /// The states, or why there is none, by client.
+    /// The states by client, or the reasons why clients give none.
     states: BTreeMap<usize, Result<Vec<u8>, String>>,
     since: Nanos,
 }

@@ -24,8 +24,8 @@ use tickbus_virtual_time::client::Client;
 #[cfg(unix)]
 use tickbus_virtual_time::shared_memory;
 use tickbus_virtual_time::{
-    Controls, Declaration, Hosting, Logic, Meeting, Participant, Settings, StartCondition, Step,
-    Variable, in_process, tcp,
+    Controls, Declaration, Exchange, Hosting, Logic, Meeting, Participant, Settings,
+    StartCondition, Step, Variable, in_process, tcp,
 };
 
 /// The bytes of a step and of its answer without any variable, in our format.
@@ -306,7 +306,11 @@ fn over(place: &str, direct: bool, count: usize, variables: usize, span: Duratio
         Ok(())
     });
     let settings = Settings {
-        direct,
+        exchange: if direct {
+            Exchange::Direct
+        } else {
+            Exchange::ByServer { rejoin: None }
+        },
         ..settings(count)
     };
     let mut is_direct = false;

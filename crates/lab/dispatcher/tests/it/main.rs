@@ -4,6 +4,7 @@
 mod client;
 mod common;
 mod document;
+mod host_names;
 mod hosts;
 mod key;
 mod model;

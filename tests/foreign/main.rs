@@ -20,6 +20,8 @@ mod iec2c;
 #[cfg(feature = "opcua")]
 mod java;
 mod modbus;
+mod modbus_functions;
+mod modbus_lines;
 #[cfg(feature = "modbus-tls")]
 mod modbus_tls;
 #[cfg(feature = "page")]
@@ -58,6 +60,8 @@ fn main() -> ExitCode {
         #[cfg(feature = "opcua")]
         ("opcua", opcua::TESTS),
         ("modbus", modbus::TESTS),
+        ("modbus_functions", modbus_functions::TESTS),
+        ("modbus_lines", modbus_lines::TESTS),
         #[cfg(feature = "modbus-tls")]
         ("modbus_tls", modbus_tls::TESTS),
         ("devices", devices::TESTS),

@@ -4,7 +4,7 @@
 
 use std::fmt::Write as _;
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
-use std::net::{SocketAddr, TcpListener, TcpStream, UdpSocket};
+use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::process::{Child, Command, Stdio};
 
 use crate::harness::machine::Machine;
@@ -25,12 +25,7 @@ pub(crate) const TESTS: &[(&str, Test)] = &[
         "pymodbus_drives_our_server_with_rtu_over_tcp",
         pymodbus_drives_our_server_with_rtu,
     ),
-    ("pymodbus_drives_our_server_over_udp", pymodbus_over_udp),
     ("pymodbus_meets_units_and_gateways", pymodbus_meets_units),
-    (
-        "pymodbus_reads_files_queues_and_status_of_a_device",
-        pymodbus_reads_files,
-    ),
     (
         "pymodbus_finds_a_device_where_its_maker_put_it",
         pymodbus_finds_places,
@@ -44,7 +39,6 @@ pub(crate) const TESTS: &[(&str, Test)] = &[
         "our_client_drives_pymodbus_with_rtu_over_tcp",
         our_client_drives_pymodbus_with_rtu,
     ),
-    ("our_client_drives_pymodbus_over_udp", our_client_over_udp),
     (
         "our_client_writes_only_into_the_device_that_was_named",
         our_client_writes_only_where_it_may,
@@ -66,16 +60,6 @@ pub(crate) const TESTS: &[(&str, Test)] = &[
     ),
     #[cfg(unix)]
     (
-        "pymodbus_drives_our_server_as_ascii_on_a_serial_line",
-        pymodbus_drives_our_server_as_ascii,
-    ),
-    #[cfg(unix)]
-    (
-        "our_client_drives_pymodbus_as_ascii_on_a_serial_line",
-        our_client_drives_pymodbus_as_ascii,
-    ),
-    #[cfg(unix)]
-    (
         "mbpoll_reads_and_writes_our_server_on_a_serial_line",
         mbpoll_on_a_line,
     ),
@@ -92,7 +76,7 @@ pub(crate) fn open(fieldbus: &str, signals: &str) -> Machine {
 }
 
 /// A machine that mirrors each byte of %Q to the byte of %I at the same offset.
-trait Mirror {
+pub(crate) trait Mirror {
     /// A tick that copies the bytes `q N` to `i N`.
     fn mirror(&mut self);
     fn mirror_until_the_end_of(&mut self, command: Command) -> String;
@@ -124,7 +108,7 @@ fn pymodbus_version() -> String {
 }
 
 /// A byte in each direction at every offset, except for some of %Q with REALs in two byte orders.
-fn signals() -> String {
+pub(crate) fn signals() -> String {
     let mut text = format!("input_bytes = {BYTES}\noutput_bytes = {BYTES}\n");
     for byte in 0..BYTES {
         let _ = write!(
@@ -149,7 +133,7 @@ fn signals() -> String {
     text
 }
 
-fn pymodbus(script: &str) -> Result<Command, Absent> {
+pub(crate) fn pymodbus(script: &str) -> Result<Command, Absent> {
     let mut python = harness::python_with("main", &["pymodbus", "serial"])?;
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/peers/");
     python.arg(format!("{folder}{script}"));
@@ -178,68 +162,6 @@ fn pymodbus_drives(mode: &str, framing: &str) -> Result<(), Absent> {
     assert_eq!((machine.get("abcd"), machine.get("cdab")), (1234.5, -0.125));
     let refused = if mode == "tcp" { "4" } else { "3" };
     assert_eq!(machine.statistic("modbus-server.illegal_function"), refused);
-    Ok(())
-}
-
-fn pymodbus_over_udp() -> Result<(), Absent> {
-    let mut client = pymodbus("modbus_client.py")?;
-    let server =
-        "kind = \"modbus-server\"\naddress = \"127.0.0.1:0\"\nframing = \"udp\"\nmax_age = \"1h\"";
-    let mut machine = open(server, &signals());
-    let address = machine.address();
-    client.args([
-        "udp",
-        &address.ip().to_string(),
-        &address.port().to_string(),
-    ]);
-    let told = machine.mirror_until_the_end_of(client);
-    assert!(told.contains("modbus_client: ok checks="), "{told}");
-    machine.until("the last write is through", |machine| {
-        machine.get("cdab") != 0.0
-    });
-    assert_eq!((machine.get("abcd"), machine.get("cdab")), (1234.5, -0.125));
-    Ok(())
-}
-
-/// A device with files, a queue, eight bits of status and counters, as few devices have over TCP.
-fn pymodbus_reads_files() -> Result<(), Absent> {
-    let mut python = harness::python_with("main", &["pymodbus"])?;
-    let server = "kind = \"modbus-server\"\naddress = \"127.0.0.1:0\"\nmax_age = \"1h\"\nfiles = [1, 4]\n\
-                  queues = [\"400005\"]\nexception_status = \"discrete-input:9\"\ndiagnostics = true";
-    let mut machine = open(server, &signals());
-    machine.set("i 1", 165.0);
-    machine.tick();
-    let address = machine.address();
-    python.args([
-        "-c",
-        "import sys\n\
-         from pymodbus.client import ModbusTcpClient\n\
-         from pymodbus.pdu.file_message import FileRecord\n\
-         client = ModbusTcpClient('127.0.0.1', port=int(sys.argv[1]), retries=0)\n\
-         client.connect()\n\
-         def code(answer): return answer.exception_code\n\
-         first = FileRecord(file_number=4, record_number=7, record_data=b'\\x06\\xaf\\x04\\xbe')\n\
-         last = FileRecord(file_number=1, record_number=9999, record_data=b'ok')\n\
-         assert not client.write_file_record([first, last]).isError()\n\
-         def part(file, record, words): return FileRecord(file_number=file, record_number=record, record_length=2 * words)\n\
-         read = client.read_file_record([part(4, 8, 1), part(1, 9998, 2)]).records\n\
-         assert [record.record_data for record in read] == [b'\\x04\\xbe', b'\\0\\0ok'], read\n\
-         assert code(client.read_file_record([part(2, 0, 1)])) == 2\n\
-         assert code(client.read_file_record([part(1, 9999, 2)])) == 2\n\
-         assert code(client.read_file_record([part(1, 0, 125)])) == 3\n\
-         assert not client.write_registers(4, [3, 11, 12, 13]).isError()\n\
-         for _ in range(2):\n\
-         \x20   assert client.read_fifo_queue(address=4).values == [11, 12, 13]\n\
-         assert code(client.read_fifo_queue(address=5)) == 2\n\
-         assert not client.write_register(4, 32).isError()\n\
-         assert code(client.read_fifo_queue(address=4)) == 3\n\
-         assert client.read_exception_status().status == 165\n\
-         assert client.diag_query_data(b'\\x12\\x34').message == b'\\x12\\x34'\n\
-         assert client.diag_read_bus_exception_error_count().message == 5\n\
-         assert client.diag_get_comm_event_counter().count == 9\n",
-        &address.port().to_string(),
-    ]);
-    machine.until_the_end_of(python, Machine::tick);
     Ok(())
 }
 
@@ -529,35 +451,6 @@ fn our_client_drives_pymodbus_with_rtu() -> Result<(), Absent> {
     Ok(())
 }
 
-fn our_client_over_udp() -> Result<(), Absent> {
-    let socket = UdpSocket::bind("127.0.0.1:0").expect("a free port");
-    let address = socket.local_addr().expect("it is bound");
-    drop(socket);
-    let (ip, port) = (address.ip().to_string(), address.port().to_string());
-    let server = Server::start(&["udp", &ip, &port])?;
-    let client = format!(
-        "kind = \"modbus-client\"\naddress = \"{address}\"\nframing = \"udp\"\n{ALLOWED}\n"
-    );
-    for (keys, count) in [
-        ("inputs = \"offset:0\"", 64),
-        ("inputs = \"offset:1000\"\noutputs = \"401001\"", 300),
-        ("inputs = \"coil:1\"\noutputs = \"coil:1\"", 10),
-    ] {
-        let machine = loop_through(&format!("{client}{keys}"), count);
-        machine.end.driver.close();
-    }
-    // The server dies and is restarted.
-    let mut machine = loop_through(&format!("{client}inputs = \"offset:0\""), 4);
-    drop(server);
-    machine.until("the line is lost", |machine| {
-        machine.driver.link().state != LinkState::Running
-    });
-    let _server = Server::start(&["udp", &ip, &port])?;
-    machine.set("i 0", 99.0);
-    machine.until("the value is back", |machine| machine.get("q 0") == 99.0);
-    Ok(())
-}
-
 fn our_client_writes_only_where_it_may() -> Result<(), Absent> {
     logged::expect("nothing is written into the PLC \"ACME PLC 7 1.2\"");
     let (_server, address) = Server::tcp()?;
@@ -693,45 +586,6 @@ fn our_client_drives_pymodbus_on_a_line() -> Result<(), Absent> {
     for (keys, count) in [
         ("inputs = \"offset:0\"", 64),
         ("inputs = \"offset:0\"\nread_write = false", 150),
-        ("inputs = \"coil:1\"\noutputs = \"coil:1\"", 10),
-    ] {
-        let machine = loop_through(&format!("{client}{keys}"), count);
-        machine.end.driver.close();
-    }
-    Ok(())
-}
-
-#[cfg(unix)]
-fn as_ascii(end: &str, device: &std::path::Path) -> String {
-    let device = device.display();
-    format!(
-        "kind = \"modbus-{end}\"\nmax_age = \"1h\"\ndevice = \"{device}\"\nframing = \"ascii\"\nbaud = 115200\n"
-    )
-}
-
-#[cfg(unix)]
-fn pymodbus_drives_our_server_as_ascii() -> Result<(), Absent> {
-    let mut client = pymodbus("modbus_client.py")?;
-    let line = pty::Line::new();
-    let mut machine = open(&as_ascii("server", line.end(0)), &signals());
-    machine.until("it listens", |machine| {
-        statistic(&machine.driver, "device").is_some()
-    });
-    client.arg("ascii").arg(line.end(1));
-    let told = machine.mirror_until_the_end_of(client);
-    assert!(told.contains("modbus_client: ok checks="), "{told}");
-    assert_eq!(machine.get("abcd"), 1234.5);
-    Ok(())
-}
-
-#[cfg(unix)]
-fn our_client_drives_pymodbus_as_ascii() -> Result<(), Absent> {
-    let line = pty::Line::new();
-    let device = line.end(1).display().to_string();
-    let _server = Server::start(&["ascii", &device])?;
-    let client = format!("{}{ALLOWED}\n", as_ascii("client", line.end(0)));
-    for (keys, count) in [
-        ("inputs = \"offset:0\"", 64),
         ("inputs = \"coil:1\"\noutputs = \"coil:1\"", 10),
     ] {
         let machine = loop_through(&format!("{client}{keys}"), count);

@@ -55,7 +55,7 @@ pub(crate) const CLIENT_KEYS: &[Key] = &[
 pub struct Tls {
     /// The certificate of this end.
     pub certificate: PathBuf,
-    /// Its private key.
+    /// The private key of that certificate.
     pub private_key: PathBuf,
     /// The authorities of the other end.
     pub authorities: PathBuf,

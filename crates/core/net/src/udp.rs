@@ -120,13 +120,13 @@ mod tests {
 
     #[test]
     fn each_read_is_one_datagram() {
-        let (clock, stop) = (Monotonic::default(), Stop::new());
+        let (clock, stop) = (Monotonic::shared(), Stop::new());
         let any = Address::local(0);
-        let (server, bound) = bind_udp(&any, &clock, &stop)
+        let (server, bound) = bind_udp(&any, &*clock, &stop)
             .expect("it is free")
             .expect("no stop");
         let to = bound.to_string().parse().expect("an address");
-        let (mut client, peer) = Datagrams::connect(&to, &clock, &stop)
+        let (mut client, peer) = Datagrams::connect(&to, &*clock, &stop)
             .expect("this computer")
             .expect("no stop");
         assert_eq!(peer, bound);

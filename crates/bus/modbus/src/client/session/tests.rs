@@ -129,17 +129,6 @@ fn serial() -> Framing {
     }
 }
 
-/// Unit and PDU of a telegram in ASCII.
-#[track_caller]
-fn of_characters(mut characters: &[u8]) -> (u8, Vec<u8>) {
-    let mut framer = ascii::Framer::new(ascii::SILENCE);
-    framer.arrived(Nanos::ZERO, &mut characters);
-    let bytes = framer.take(Nanos::ZERO, |bytes| bytes.map(<[u8]>::to_vec));
-    let bytes = bytes.expect("a whole one").expect("of usual length");
-    let (unit, pdu) = ascii::parse(&bytes).expect("undamaged");
-    (unit, pdu.to_vec())
-}
-
 fn tcp() -> Framing {
     Framing::Tcp {
         transaction: 0,
@@ -175,14 +164,8 @@ impl Line<'_> {
             if !telegram.is_empty() {
                 self.poll.wrote(self.now, telegram.len(), self.port);
                 return match self.poll.framing {
-                    Framing::Serial {
-                        coding: Coding::Ascii,
-                        ..
-                    } => {
-                        let (unit, pdu) = of_characters(&telegram);
-                        (unit, pdu)
-                    }
-                    Framing::Serial { .. } | Framing::RtuOverTcp { .. } => {
+                    Framing::Serial { coding, .. } => datagrams::unit_and_pdu(coding, &telegram),
+                    Framing::RtuOverTcp { .. } => {
                         let (unit, pdu) = rtu::parse(&telegram).expect("a telegram");
                         (unit, pdu.to_vec())
                     }
@@ -209,11 +192,10 @@ impl Line<'_> {
     fn answer_as(&mut self, unit: u8, pdu: &[u8]) {
         let mut telegram = Vec::new();
         match self.poll.framing {
-            Framing::Serial {
-                coding: Coding::Ascii,
-                ..
-            } => ascii::append(unit, &mut telegram, |bytes| bytes.extend_from_slice(pdu)),
-            Framing::Serial { .. } | Framing::RtuOverTcp { .. } => {
+            Framing::Serial { coding, .. } => {
+                coding.append(unit, &mut telegram, |bytes| bytes.extend_from_slice(pdu));
+            }
+            Framing::RtuOverTcp { .. } => {
                 rtu::append(unit, &mut telegram, |bytes| bytes.extend_from_slice(pdu));
             }
             Framing::Tcp { .. } | Framing::Udp { .. } => {

@@ -2,6 +2,20 @@
 
 use super::*;
 
+/// Unit and PDU of a telegram on a serial line.
+#[track_caller]
+pub(super) fn unit_and_pdu(coding: Coding, mut telegram: &[u8]) -> (u8, Vec<u8>) {
+    let mut bytes = telegram.to_vec();
+    if coding == Coding::Ascii {
+        let mut framer = ascii::Framer::new(ascii::SILENCE);
+        framer.arrived(Nanos::ZERO, &mut telegram);
+        let whole = framer.take(Nanos::ZERO, |bytes| bytes.map(<[u8]>::to_vec));
+        bytes = whole.expect("a whole one").expect("of usual length");
+    }
+    let (unit, pdu) = coding.parse(&bytes).expect("undamaged");
+    (unit, pdu.to_vec())
+}
+
 fn udp() -> Framing {
     Framing::Udp {
         transaction: 0,

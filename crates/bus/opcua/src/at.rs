@@ -26,7 +26,7 @@ impl ServerOptions {
     pub fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {
         let mut placed = Vec::new();
         for line in lines {
-            let (node, member) = member::split(&line.text);
+            let (node, member) = member::split(line.text);
             let node: NodeName = match node.parse() {
                 Ok(node) => node,
                 Err(mistake) => {
@@ -70,13 +70,13 @@ impl ServerOptions {
             }
         }
         let device = self.device_nodes(&[]);
-        let mut taken: HashMap<(&(u16, Identifier), &str), (&String, &At<'_>)> = HashMap::new();
+        let mut taken = HashMap::new();
         for (name, line) in &placed {
             let Some(node) = device.nodes.get(*name) else {
                 continue;
             };
             let key = (node, &*self.nodes[*name].member);
-            if let Some((other, of)) = taken.insert(key, (name, line)) {
+            if let Some((other, of)) = taken.insert(key, (*name, *line)) {
                 for (line, name) in [(*line, other), (of, *name)] {
                     line.wrong(
                         format!("\"{}\" is that node, too", shown(name)),

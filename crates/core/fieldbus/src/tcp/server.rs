@@ -647,13 +647,15 @@ impl<C> Client<C> {
                     return Err((telegrams, error));
                 }
                 let before = self.held.back().map_or(now, |held| held.due);
-                let is_late = late > Nanos::ZERO;
+                let stations = if late > Nanos::ZERO {
+                    port.take_late_stations()
+                } else {
+                    Vec::new()
+                };
                 self.held.push_back(Held {
                     due: before.max(now + late),
                     answer: reply.split_off(begin),
-                    stations: is_late
-                        .then(|| port.take_late_stations())
-                        .unwrap_or_default(),
+                    stations,
                 });
             }
         }

@@ -97,7 +97,7 @@ impl Types {
         let encodings = self.encodings.get(id).into_iter().flatten();
         let binary = encodings
             .filter(|encoding| self.binary.contains(encoding))
-            .min_by_key(|encoding| encoding.to_string());
+            .min_by_key(ToString::to_string);
         Some(DataTypeDefinition::Structure(StructureDefinition {
             default_encoding_id: binary.cloned().unwrap_or_else(NodeId::null),
             base_data_type: base.clone(),

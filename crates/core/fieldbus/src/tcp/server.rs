@@ -1,5 +1,7 @@
 //! A server for many clients, for any protocol that implements [`Service`].
 
+mod held;
+
 use std::collections::{BTreeSet, VecDeque};
 use std::io::{self, Read as _, Write as _};
 use std::net::SocketAddr;
@@ -12,6 +14,7 @@ use tickbus_base::time::{Nanos, Stop};
 use tickbus_net::{Acceptor, Address, close_by_reset, close_gracefully, is_for_later, prepare};
 
 use super::{listen, no_wait, not_accepted};
+use held::Held;
 
 /// The limits that a server sets for its clients.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -118,15 +121,6 @@ pub fn serve<S: Service>(
 
 /// At most this many answers to a client are held back.
 const HELD: usize = 1000;
-
-/// An answer that a fault holds back.
-#[derive(Debug)]
-struct Held {
-    due: Nanos,
-    answer: Vec<u8>,
-    /// The stations that answer late; empty for an answer that waits behind another one.
-    stations: Vec<usize>,
-}
 
 /// At most this many bytes are read from a client per turn, before others are served.
 const BUFFER: usize = 4096;
@@ -439,9 +433,7 @@ impl<S: Service> Server<'_, S> {
             let client = client.expect("its answers are held back");
             while client.held.front().is_some_and(|held| held.due <= now) {
                 let held = client.held.pop_front().expect("it was just there");
-                let mut stations = held.stations.into_iter();
-                if stations.any(|station| !port.is_station_up(station, now)) {
-                    // A dead station sends nothing, not even the answer that it owes.
+                if held.is_lost(now, port) {
                     self.service.unheard(&mut client.state, now, port);
                 } else {
                     self.reply.extend_from_slice(&held.answer);
@@ -646,17 +638,9 @@ impl<C> Client<C> {
                     ));
                     return Err((telegrams, error));
                 }
-                let before = self.held.back().map_or(now, |held| held.due);
-                let stations = if late > Nanos::ZERO {
-                    port.take_late_stations()
-                } else {
-                    Vec::new()
-                };
-                self.held.push_back(Held {
-                    due: before.max(now + late),
-                    answer: reply.split_off(begin),
-                    stations,
-                });
+                let before = self.held.back();
+                let held = Held::new(before, reply.split_off(begin), (now, late), port);
+                self.held.push_back(held);
             }
         }
         if rest.len() > longest {

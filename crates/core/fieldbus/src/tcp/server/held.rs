@@ -1,0 +1,42 @@
+//! Answers that faults hold back.
+
+use tickbus_base::time::Nanos;
+
+use crate::Port;
+
+/// An answer that a fault holds back.
+#[derive(Debug)]
+pub(super) struct Held {
+    pub(super) due: Nanos,
+    pub(super) answer: Vec<u8>,
+    /// The stations that answer late; empty for an answer that waits behind another one.
+    stations: Vec<usize>,
+}
+
+impl Held {
+    /// An answer that was made at `now` and goes out this much later, but not before the one ahead of it.
+    pub(super) fn new(
+        ahead: Option<&Self>,
+        answer: Vec<u8>,
+        (now, late): (Nanos, Nanos),
+        port: &mut Port,
+    ) -> Self {
+        let earliest = ahead.map_or(now, |ahead| ahead.due);
+        let stations = if late > Nanos::ZERO {
+            port.take_late_stations()
+        } else {
+            Vec::new()
+        };
+        Self {
+            due: earliest.max(now + late),
+            answer,
+            stations,
+        }
+    }
+
+    /// Returns true if a station of it is dead: that sends nothing, not even the answer that it owes.
+    pub(super) fn is_lost(&self, now: Nanos, port: &mut Port) -> bool {
+        let mut stations = self.stations.iter();
+        stations.any(|station| !port.is_station_up(*station, now))
+    }
+}

@@ -36,7 +36,9 @@ impl Held {
 
     /// Returns true if a station of it is dead: that sends nothing, not even the answer that it owes.
     pub(super) fn is_lost(&self, now: Nanos, port: &mut Port) -> bool {
-        let mut stations = self.stations.iter();
-        stations.any(|station| !port.is_station_up(*station, now))
+        // A protocol may answer for more stations than its line has.
+        let there = self.stations.iter().filter(|at| **at < port.stations());
+        let there: Vec<usize> = there.copied().collect();
+        there.into_iter().any(|at| !port.is_station_up(at, now))
     }
 }

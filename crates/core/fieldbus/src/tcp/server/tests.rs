@@ -467,23 +467,3 @@ fn answers_that_a_fault_holds_back_go_out_in_order_at_their_time() {
     server.bring_up(fault);
     ask(&mut client, &[2, 5, 6]);
 }
-
-#[test]
-fn an_answer_that_a_fault_holds_back_is_lost_if_its_station_is_dead_when_it_is_due() {
-    let mut server = Running::new();
-    let mut client = server.client();
-    let late = server.inject(LineEffect::Answer(AnswerEffect {
-        station: None,
-        function: Some(7),
-        chance: 1.0,
-        trouble: AnswerTrouble::Late(Nanos::from_millis(50)),
-    }));
-    client.write_all(&[1, 7]).expect("the server reads");
-    server.until(|server| server.fact("test.heard").as_deref() == Some("1"));
-    let dead = server.inject(LineEffect::StationDown(0));
-    server.pass(Nanos::from_millis(60));
-    server.until(|server| server.clock.is_settled(1));
-    server.bring_up(dead);
-    server.bring_up(late);
-    ask(&mut client, &[2, 5, 6]);
-}

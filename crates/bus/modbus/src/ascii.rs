@@ -210,13 +210,11 @@ mod tests {
         let mut all = Vec::new();
         loop {
             framer.arrived(Nanos::ZERO, &mut characters);
-            match framer.take(Nanos::ZERO, |bytes| bytes.map(<[u8]>::to_vec)) {
-                Some(bytes) => all.push(bytes),
-                None => {
-                    assert!(characters.is_empty());
-                    return all;
-                }
-            }
+            let Some(bytes) = framer.take(Nanos::ZERO, |bytes| bytes.map(<[u8]>::to_vec)) else {
+                assert!(characters.is_empty());
+                return all;
+            };
+            all.push(bytes);
         }
     }
 

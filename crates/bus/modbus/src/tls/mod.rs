@@ -90,9 +90,8 @@ impl ClientSide {
     pub(crate) fn load(tls: &Tls, address: &Address, folder: &Path) -> Result<Self, OpenError> {
         let config = client_config(tls, folder).map_err(OpenError::Config)?;
         let name = match (&tls.server_name, &address.host) {
-            (Some(name), _) => name.clone(),
             (None, Host::Ip(ip)) => ip.to_string(),
-            (None, Host::Name(name)) => name.clone(),
+            (Some(name), _) | (None, Host::Name(name)) => name.clone(),
         };
         let name = ServerName::try_from(name).map_err(|_| {
             OpenError::Config(Mistake::new(

@@ -202,7 +202,9 @@ mod tests {
 
     fn object(parts: &[Part]) -> PlacedObject {
         let mut object = PlacedObject::new(None, Object::Block(1), 0);
-        parts.iter().for_each(|part| object.parts.push(*part));
+        for part in parts {
+            object.parts.push(*part);
+        }
         object.finish(4);
         object
     }

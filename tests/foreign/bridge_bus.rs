@@ -219,7 +219,7 @@ fn document() -> Result<(), Absent> {
         }
     }
     let starts = |line: &str| line.split_once("AI1=")?.1.parse().ok();
-    while !starts(&watch.until("P ")).is_some_and(|starts: u32| starts > 3) {}
+    while starts(&watch.until("P ")).is_none_or(|starts: u32| starts <= 3) {}
     end(second);
     lab.end();
     Ok(())

@@ -179,6 +179,28 @@ fn a_write_to_a_unit_that_is_cut_off_is_lost_and_is_not_read_back() {
 }
 
 #[test]
+fn a_late_answer_is_lost_if_its_unit_is_cut_off_before() {
+    let text = format!(
+        "[driver]\nid = 1\nname = \"cell\"\n[fieldbus]\nkind = \"modbus-server\"\naddress = \"127.0.0.1:0\"\n{TWO_UNITS}"
+    );
+    let mut device = Alone::open(&text, &KINDS);
+    let mut stream = client(device.address());
+    suffer(
+        &mut device,
+        "kind = \"answer-late\"\nby = \"1s\"\nstation = \"press\"",
+    );
+    let on = [6, 0, 0, 0, 7];
+    for (unit, pdu) in [(3, &[3, 0, 0, 0, 1][..]), (7, &on)] {
+        let sent = stream.write_all(&request(1, unit, pdu));
+        sent.expect("the server reads");
+    }
+    device.until("both are served", |end| end.get("oven") == 7.0);
+    suffer(&mut device, "kind = \"station-down\"\nstation = \"press\"");
+    device.clock.advance(Nanos::from_secs(2));
+    assert_eq!(answer(&mut stream, 1), on, "the only answer");
+}
+
+#[test]
 fn changes_are_events_or_every_write_is() {
     for (events, expected) in [
         ("true", vec![5.0, 6.0]),

@@ -113,7 +113,7 @@ pub(crate) const SERVER: &[Key] = &[
     ),
     Key::new(
         "queues",
-        Shape::List(&Shape::Text, 1, QUEUES),
+        Shape::List(&Shape::Text, 0, QUEUES),
         "Holding registers that count the registers behind them, which function 24 reads as a queue",
     ),
     Key::new(
@@ -123,7 +123,7 @@ pub(crate) const SERVER: &[Key] = &[
     ),
     Key::new(
         "files",
-        Shape::List(&Shape::Whole(1, 0xFFFF), 1, FILES),
+        Shape::List(&Shape::Whole(1, 0xFFFF), 0, FILES),
         "The numbers of the files that functions 20 and 21 read and write, each with 10,000 records",
     ),
 ];

@@ -26,6 +26,7 @@ pub(crate) fn split(text: &str) -> (&str, &str) {
 }
 
 /// The places at which the steps behind a text can begin, the last one first.
+#[cfg(any(feature = "opcua", test))]
 pub(crate) fn begins(text: &str) -> impl Iterator<Item = usize> {
     let places = text.match_indices(['[', '.']);
     let places: Vec<usize> = places.map(|(at, _)| at).collect();

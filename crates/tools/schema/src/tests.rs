@@ -196,7 +196,7 @@ const BUSES: [&str; 7] = [
      [[fault]]\nkind = \"answer-late\"\nby = \"1s\"\n\
      [[fault]]\nkind = \"answer-error\"\ncode = 5\n\
      [[fault]]\nkind = \"answer-wrong\"\nhow = \"unit\"\n",
-    "kind = \"modbus-server\"\nidentity = {}\nreserved = [{ at = \"400001\" }]\nat = { A = \"400009\" }\n\
+    "kind = \"modbus-server\"\nidentity = {}\nreserved = [{ at = \"400001\" }, { at = \"100001\", count = 8 }]\nat = { A = \"400009\" }\n\
      diagnostics = true\nexception_status = \"100001\"\nqueues = [\"400001\"]\nfiles = [1]\n\
      tls = { certificate_file = \"a\", private_key_file = \"b\", ca_file = \"c\", write_roles = [\"d\"] }\n",
     "kind = \"modbus-client\"\ninputs = [{ at = \"offset:0\" }]\noutputs = [{ at = \"offset:500\" }]\n\

@@ -60,12 +60,12 @@ pub(crate) const KEYS: &[Key] = &[
     ),
     Key::new(
         "records",
-        Shape::List(&Shape::Label(RECORD_TEXT_LIMIT), 1, RECORDS_LIMIT),
+        Shape::List(&Shape::Label(RECORD_TEXT_LIMIT), 0, RECORDS_LIMIT),
         "Records with octets, such as \"slot 2 record 10 = 00 64\"",
     ),
     Key::new(
         "parameters",
-        Shape::List(&Shape::Label(RECORD_TEXT_LIMIT), 1, RECORDS_LIMIT),
+        Shape::List(&Shape::Label(RECORD_TEXT_LIMIT), 0, RECORDS_LIMIT),
         "Parameters of a drive with values, such as \"945 Unsigned16 = 1355 0 0\"",
     ),
     Key::new(

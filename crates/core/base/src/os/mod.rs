@@ -2,6 +2,7 @@
 
 mod at_exit;
 mod file_lock;
+mod freed_memory;
 pub mod helper;
 mod library;
 #[cfg_attr(not(unix), path = "no_linked_terminal.rs")]
@@ -31,6 +32,7 @@ mod timer_slack;
 pub use crate::time::{Interest, Ready};
 pub use at_exit::at_exit;
 pub use file_lock::{Lock, lock_file, lock_holder, unlock_file};
+pub use freed_memory::return_freed_memory;
 pub use library::{Library, one_line};
 pub use linked_terminal::LinkedTerminal;
 pub use log::{

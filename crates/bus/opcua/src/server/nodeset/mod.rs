@@ -15,6 +15,7 @@ use opcua::types::{
 use opcua_server::address_space::{AddressSpace, HasNodeId, ImportedItem, NodeType, Variable};
 use roxmltree::{Document, Node, ParsingOptions};
 use tickbus_base::Mistake;
+use tickbus_base::os::return_freed_memory;
 use tickbus_base::toml_text::shown;
 
 use crate::namespaces::UA;
@@ -165,6 +166,10 @@ impl NodeSets {
             }
         })?;
         types.define(space);
+        if !self.files.is_empty() {
+            // The parsed trees of the files were several times as large as the nodes.
+            return_freed_memory();
+        }
         Ok(())
     }
 

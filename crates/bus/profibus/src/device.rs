@@ -219,7 +219,7 @@ impl Process for Machine<'_> {
             let frame = side.outputs.receive(outputs, &mut side.frame);
             return self.port.received(index, now, frame);
         }
-        side.outputs.receive(outputs, &mut side.frame);
+        side.outputs.take(outputs, &mut side.frame);
         side.take_records();
         self.port.received(index, now, &side.frame);
     }

@@ -282,6 +282,16 @@ impl Layout {
         }
         frame
     }
+
+    /// Copies the frame of the image out of a telegram.
+    pub(crate) fn take(&self, wire: &[u8], frame: &mut [u8]) {
+        if self.moves.is_some() {
+            self.receive(wire, frame);
+        } else {
+            let count = frame.len();
+            frame.copy_from_slice(&wire[..count]);
+        }
+    }
 }
 
 /// Copies a signal: a bit, or whole bytes.
@@ -419,6 +429,13 @@ mod tests {
             layout.receive(&[0x12, 0x35, 0], &mut frame),
             [0x12, 0x35, 1]
         );
+    }
+
+    #[test]
+    fn a_frame_without_places_is_taken_out_of_a_telegram_too() {
+        let mut frame = [0; 2];
+        Layout::default().take(&[1, 2, 3], &mut frame);
+        assert_eq!(frame, [1, 2]);
     }
 
     #[test]

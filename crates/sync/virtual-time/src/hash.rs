@@ -48,6 +48,16 @@ impl Trace {
         trace
     }
 
+    /// Reads a trace that was saved; `None` if these bytes are no state of the hash.
+    pub(crate) fn from_bytes(bytes: &[u8]) -> Option<Self> {
+        // Key, length, state, and the bytes of the last word that is not complete.
+        type Fields = (u64, u64, u64, [u64; 4], u64, u64);
+        let (k0, k1, length, _, tail, count): Fields = postcard::from_bytes(bytes).ok()?;
+        let is_state = (k0, k1, count) == (0, 0, length % 8) && tail >> (8 * count) == 0;
+        let trace: Self = postcard::from_bytes(bytes).ok()?;
+        is_state.then_some(trace)
+    }
+
     /// Adds a commit: all variables with their new values, changed or not.
     pub fn commit(&mut self, step: Step, values: &[u64]) {
         self.word(step.sequence);

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use tickbus_base::time::{Clock, Nanos, Stop};
 
 use crate::saved_run;
-use crate::server::{Control, Server};
+use crate::server::{Control, Saved, Server};
 use crate::view::RunView;
 use crate::wire::{self, FromClient};
 
@@ -106,11 +106,14 @@ impl fmt::Debug for Hosting<'_> {
     }
 }
 
-/// Writes a run that was just saved to its file.
+/// Writes runs that were just saved to their file.
 pub(crate) fn keep(server: &mut Server<'_>, hosting: &mut Hosting<'_>) {
-    let Some(saved) = server.take_saved() else {
-        return;
-    };
+    while let Some(saved) = server.take_saved() {
+        keep_one(server, hosting, saved);
+    }
+}
+
+fn keep_one(server: &Server<'_>, hosting: &mut Hosting<'_>, saved: Saved) {
     let written = saved.and_then(|(step, content)| match server.saved_to() {
         Some(file) => match saved_run::write(file, &content) {
             Ok(()) => Ok(format!("saved after step {} in {}", step, file.display())),

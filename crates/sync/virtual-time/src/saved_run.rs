@@ -92,8 +92,12 @@ impl SavedRun {
         self.clients.iter().map(|client| &*client.declaration.name)
     }
 
-    /// Checks that a client is the one that it was, or returns the difference.
-    pub(crate) fn takes(&self, declaration: &Declaration) -> Result<(), String> {
+    /// Checks that a client is the one that it was, and can get back what it was, or returns the difference.
+    pub(crate) fn takes(
+        &self,
+        declaration: &Declaration,
+        takes_states: bool,
+    ) -> Result<(), String> {
         let name = &declaration.name;
         let mut clients = self.clients.iter().map(|client| &client.declaration);
         let Some(was) = clients.find(|was| was.name == *name) else {
@@ -104,6 +108,10 @@ impl SavedRun {
         match was.difference(declaration) {
             Some(difference) => Err(format!(
                 "in the saved run \"{name}\" declared other things: {difference}"
+            )),
+            None if self.memory.is_none() && !takes_states => Err(format!(
+                "the saved run has only the state of \"{name}\" and not its steps, and this client cannot take over a \
+                 state; use one of version 4"
             )),
             None => Ok(()),
         }
@@ -201,8 +209,7 @@ impl SavedRun {
         }
         let length_of_trace = reader_count(&mut reader)?;
         let trace = reader.bytes(length_of_trace)?;
-        let trace = postcard::from_bytes(trace)
-            .map_err(|_| "has a trace that cannot be read".to_owned())?;
+        let trace = Trace::from_bytes(trace).ok_or("has a trace that cannot be read")?;
         let mut clients: Vec<ClientState> = Vec::new();
         for _ in 0..u16::from_le_bytes(reader.take()?) {
             let declaration = read_declared(&mut reader, true)?;
@@ -211,6 +218,12 @@ impl SavedRun {
                 None
             } else {
                 let length = reader_count(&mut reader)?;
+                if step == 0 || length > LONGEST_STATE {
+                    return Err(format!(
+                        "has a state of {length} bytes after step {step}; a state has {LONGEST_STATE} at most, after \
+                         step 1 or a later one"
+                    ));
+                }
                 Some(reader.bytes(length)?.to_vec())
             };
             clients.push(ClientState {
@@ -405,6 +418,8 @@ mod tests {
                     continue;
                 };
                 right += 1;
+                let mut trace = run.trace.clone();
+                trace.commit(crate::step::step_of(run.step, run.length), &run.values);
                 for client in 0..run.clients.len() {
                     let Some(memory) = &run.memory else {
                         continue;
@@ -417,6 +432,18 @@ mod tests {
             }
         }
         assert!(right > 100, "{right}");
+    }
+
+    #[test]
+    fn a_state_that_no_run_can_have_is_refused() {
+        let mut run = saved();
+        run.clients[1].state = Some(vec![0; LONGEST_STATE + 1]);
+        let (_, what) = SavedRun::parse(&run.to_bytes()).expect_err("a long state");
+        assert!(what.contains("a state of 500001 bytes"), "{what}");
+        let mut run = saved();
+        run.step = 0;
+        let (_, what) = SavedRun::parse(&run.to_bytes()).expect_err("before step 1");
+        assert!(what.contains("after step 0"), "{what}");
     }
 
     #[test]

@@ -25,6 +25,7 @@ pub(crate) use joining::MOST_CLIENTS;
 pub use message::{Control, ToClient};
 use outbox::Out;
 use rejoining::Rejoining;
+pub(crate) use saving::Saved;
 use saving::Saving;
 
 /// The time for the clients to finish a step after the run was stopped.
@@ -243,7 +244,7 @@ impl<'l> Server<'l> {
             Phase::Joining(joining, _) => declaration
                 .fit(self.settings.step)
                 .and_then(|()| match &self.settings.restore {
-                    Some(saved) => saved.takes(&declaration),
+                    Some(saved) => saved.takes(&declaration, self.saving.is_able(seat)),
                     None => Ok(()),
                 })
                 .and_then(|()| joining.join(seat, declaration)),

@@ -115,7 +115,8 @@ impl Diagnostics {
     pub(super) fn begin(&mut self, pdu: &[u8], is_broadcast: bool) -> bool {
         self.note(RECEIVED | if is_broadcast { BROADCAST } else { 0 });
         self.count(Counter::Messages);
-        let restarts = matches!(pdu, &[code, high, low, ..]
+        // A restart that would be refused is not answered either.
+        let restarts = matches!(pdu, &[code, high, low, 0 | 0xFF, 0]
             if code == Function::Diagnostics.code() && u16::from_be_bytes([high, low]) == sub::RESTART);
         let acts = !self.listens || restarts && !is_broadcast;
         if !acts {
@@ -389,6 +390,7 @@ mod tests {
         assert_eq!(ask(&mut unit, &[8, 0, 4, 0, 0]), []);
         assert_eq!(ask(&mut unit, &[3, 0]), []);
         assert_eq!(ask(&mut unit, &[8, 0, 0, 1, 2]), []);
+        assert_eq!(ask(&mut unit, &[8, 0, 1, 0x12, 0x34]), []);
         assert_eq!(
             ask(&mut unit, &[8, 0, 1, 0, 0]),
             [],
@@ -408,10 +410,11 @@ mod tests {
             RECEIVED | LISTENS,
             RECEIVED | LISTENS,
             RECEIVED | LISTENS,
+            RECEIVED | LISTENS,
             SILENCED,
             RECEIVED,
         ];
-        assert_eq!(log[..6], [12, 6 + 11, 0, 0, 0, 1]);
+        assert_eq!(log[..6], [12, 6 + 12, 0, 0, 0, 1]);
         assert_eq!(log[8..], expected);
         assert_eq!(ask(&mut unit, &[8, 0, 1, 0xFF, 0]), [8, 0, 1, 0xFF, 0]);
         assert_eq!(ask(&mut unit, &[12])[8..], [RECEIVED, RESTARTED]);

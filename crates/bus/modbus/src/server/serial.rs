@@ -50,6 +50,7 @@ pub(super) fn serve(
         written: 0,
         carried: None,
         held_until: Nanos(i64::MIN),
+        late: Vec::new(),
         turned: Nanos(i64::MIN),
     };
     call.run(&mut server, port, stop)
@@ -69,6 +70,8 @@ struct Server<'a> {
     carried: Option<Carried>,
     /// Until when a fault holds the answer back.
     held_until: Nanos,
+    /// The stations that answer late.
+    late: Vec<usize>,
     /// The time of the last turn.
     turned: Nanos,
 }
@@ -86,6 +89,7 @@ impl Server<'_> {
             written,
             carried,
             held_until,
+            late,
             ..
         } = self;
         framer.take(now, |telegram| {
@@ -139,7 +143,13 @@ impl Server<'_> {
                 line.coding.spoil(reply, 0, wrong);
                 *carried = None;
             }
-            *held_until = now + port.take_lateness();
+            let lateness = port.take_lateness();
+            *held_until = now + lateness;
+            *late = if lateness > Nanos::ZERO {
+                port.take_late_stations()
+            } else {
+                Vec::new()
+            };
             port.running("a client is talking");
         });
     }
@@ -163,9 +173,10 @@ impl Caller for Server<'_> {
     fn turn(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
         self.turned = now;
         self.attend(now, port);
-        // What would go out over a line that is down is lost.
+        // What would go out over a line that is down is lost, and a dead station sends nothing.
         let is_due = self.written == 0 && !self.reply.is_empty() && now >= self.held_until;
-        if is_due && !port.is_up(now) {
+        let mut late = self.late.iter();
+        if is_due && !(port.is_up(now) && late.all(|at| port.is_station_up(*at, now))) {
             self.reply.clear();
             self.carried = None;
         }

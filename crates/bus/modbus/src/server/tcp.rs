@@ -166,4 +166,15 @@ impl Service for TcpService<'_> {
         client.carried.clear();
         Renewal::lost_all(&mut client.source.renewals, now, port.max_age());
     }
+
+    // The other units of the connection live.
+    fn unanswered(&mut self, client: &mut Client, stations: &[usize], now: Nanos, port: &mut Port) {
+        let is_of = |station: &usize| stations.contains(station);
+        client.carried.retain(|one| !is_of(&one.station));
+        for (station, renewal) in client.source.renewals.iter_mut().enumerate() {
+            if is_of(&station) {
+                renewal.lost(now, port.max_age());
+            }
+        }
+    }
 }

@@ -93,6 +93,8 @@ struct Answer {
     to: SocketAddr,
     bytes: Vec<u8>,
     carried: Option<Carried>,
+    /// The stations that answer late.
+    stations: Vec<usize>,
 }
 
 impl Server<'_> {
@@ -137,7 +139,13 @@ impl Server<'_> {
             && first.key().0 <= now
         {
             let answer = first.remove();
-            self.send(socket, &answer, port);
+            // What would go out over a line that is down is lost, and a dead station sends nothing.
+            let mut stations = answer.stations.iter();
+            if port.is_up(now) && stations.all(|at| port.is_station_up(*at, now)) {
+                self.send(socket, &answer, port);
+            } else if let Some(client) = self.clients.get_mut(&answer.to) {
+                Renewal::lost_all(&mut client.source.renewals, now, port.max_age());
+            }
         }
     }
 
@@ -198,11 +206,17 @@ impl Server<'_> {
             carried = None;
         }
         let late = port.take_lateness();
+        let stations = if late > Nanos::ZERO {
+            port.take_late_stations()
+        } else {
+            Vec::new()
+        };
         port.running("a client is talking");
         let answer = Answer {
             to: from,
             bytes,
             carried,
+            stations,
         };
         (!answer.bytes.is_empty()).then_some((answer, late))
     }

@@ -57,7 +57,7 @@ pub(super) struct Source {
 /// The values of a station's frame in an answer: they count as sent once the client has the answer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Carried {
-    station: usize,
+    pub(super) station: usize,
     generation: u64,
     receipt: Receipt,
     elements: (Table, Span),

@@ -12,6 +12,9 @@ use tickbus_fieldbus::{BusError, Port};
 use super::{ServerSide, reason, role};
 use crate::restricts::Restricts;
 
+/// The time for a client to show its certificate.
+const HANDSHAKE: Nanos = Nanos::from_secs(5);
+
 /// A service within TLS.
 pub(crate) struct TlsService<'a, S> {
     inner: S,
@@ -23,6 +26,8 @@ pub(crate) struct TlsService<'a, S> {
 pub(crate) struct Client<C> {
     inner: C,
     peer: SocketAddr,
+    /// When it connected.
+    since: Nanos,
     connection: ServerConnection,
     /// The decrypted part of a telegram.
     begun: Vec<u8>,
@@ -133,12 +138,16 @@ impl<S: Restricts> Service for TlsService<'_, S> {
 
     fn welcome(&mut self, peer: SocketAddr, now: Nanos) -> Self::Client {
         let connection = ServerConnection::new(Arc::clone(&self.side.0));
+        let mut connection = connection.expect("the configuration was accepted");
+        // All requests of one read are answered, however long the answers are.
+        connection.set_buffer_limit(None);
         Client {
             inner: self.inner.welcome(peer, now),
             peer,
-            connection: connection.expect("the configuration was accepted"),
+            connection,
             begun: Vec::new(),
             is_known: false,
+            since: now,
         }
     }
 
@@ -151,6 +160,11 @@ impl<S: Restricts> Service for TlsService<'_, S> {
         reply: &mut Vec<u8>,
         port: &mut Port,
     ) -> Result<usize, BusError> {
+        // Until it is known, its bytes do not keep its place for it.
+        if !client.is_known && now - client.since > HANDSHAKE {
+            let why = format!("it has shown no certificate within {HANDSHAKE}");
+            return Err(BusError::Protocol(why));
+        }
         let heard = self.hear(client, now, bytes, port);
         // Also what tells the client why it is refused.
         while client.connection.wants_write() && client.connection.write_tls(reply).is_ok() {}
@@ -159,6 +173,23 @@ impl<S: Restricts> Service for TlsService<'_, S> {
 
     fn speaks(&self, client: &Self::Client) -> bool {
         client.is_known
+    }
+
+    /// The encryption counts its records, also those that nobody reads.
+    fn lost(&mut self, client: &mut Self::Client, mut bytes: &[u8]) {
+        client.begun.clear();
+        while !bytes.is_empty() {
+            let read = client.connection.read_tls(&mut bytes);
+            let Ok(state) = client.connection.process_new_packets() else {
+                // The next bytes meet the same error.
+                return;
+            };
+            let mut plain = vec![0; state.plaintext_bytes_to_read()];
+            let forgotten = client.connection.reader().read_exact(&mut plain);
+            if forgotten.is_err() || matches!(read, Ok(0) | Err(_)) {
+                return;
+            }
+        }
     }
 
     fn replied(&mut self, client: &mut Self::Client, port: &mut Port) {

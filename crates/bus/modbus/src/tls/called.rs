@@ -22,6 +22,8 @@ pub(crate) struct TlsCaller<'a, C> {
     /// True if the peer has sent anything within TLS. With TLS 1.3 it judges the certificate of this end after this end has
     /// judged its own.
     has_answered: bool,
+    /// Why the connection ends, as soon as the peer has been told.
+    failed: Option<BusError>,
 }
 
 impl<'a, C: Caller> TlsCaller<'a, C> {
@@ -42,6 +44,7 @@ impl<'a, C: Caller> TlsCaller<'a, C> {
             limit: now + timeout,
             peer,
             has_answered: false,
+            failed: None,
         };
         caller.flush();
         caller
@@ -49,7 +52,7 @@ impl<'a, C: Caller> TlsCaller<'a, C> {
 
     /// Encrypts what the inner caller writes.
     fn send(&mut self, now: Nanos, port: &mut Port) {
-        if self.connection.is_handshaking() {
+        if self.failed.is_some() || self.connection.is_handshaking() {
             return;
         }
         while let plain = self.inner.to_write(now)
@@ -76,9 +79,16 @@ impl<C: Caller> Caller for TlsCaller<'_, C> {
     fn hear(&mut self, now: Nanos, mut bytes: &[u8], port: &mut Port) -> Result<(), BusError> {
         while !bytes.is_empty() {
             let read = self.connection.read_tls(&mut bytes);
-            let state = self.connection.process_new_packets().map_err(|error| {
-                BusError::Refused(format!("{}: {}", self.peer, reason::of(&error)))
-            })?;
+            let state = match self.connection.process_new_packets() {
+                Ok(state) => state,
+                Err(error) => {
+                    // The peer is told why in this turn, before `check` ends the connection.
+                    self.flush();
+                    let why = format!("{}: {}", self.peer, reason::of(&error));
+                    self.failed = Some(BusError::Refused(why));
+                    return Ok(());
+                }
+            };
             let mut plain = vec![0; state.plaintext_bytes_to_read()];
             if self.connection.reader().read_exact(&mut plain).is_ok() && !plain.is_empty() {
                 self.has_answered = true;
@@ -94,6 +104,9 @@ impl<C: Caller> Caller for TlsCaller<'_, C> {
     }
 
     fn turn(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
+        if self.failed.is_some() {
+            return Ok(());
+        }
         if !self.connection.is_handshaking() {
             self.inner.turn(now, port)?;
             self.send(now, port);
@@ -118,7 +131,10 @@ impl<C: Caller> Caller for TlsCaller<'_, C> {
     }
 
     fn check(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
-        self.inner.check(now, port)
+        match self.failed.take() {
+            Some(error) => Err(error),
+            None => self.inner.check(now, port),
+        }
     }
 
     fn deadline(&self, port: &Port) -> Nanos {

@@ -13,6 +13,9 @@ use crate::Step;
 /// The most elements of an array with signals.
 const LONGEST: usize = 10_000;
 
+/// The most values, structures and arrays in a variable with signals.
+const MOST: usize = 100_000;
+
 /// A value, or a part of it.
 #[derive(Clone, Debug)]
 pub(super) enum Content {
@@ -49,6 +52,7 @@ impl Content {
                     return Err(format!("it has {length} elements; the most are {LONGEST}"));
                 }
                 let element = Self::single(of_type, shape.data_type, tree)?;
+                bounded(element.count() * length)?;
                 Ok(Self::List(of_type, vec![element; length]))
             }
             rank => Err(format!("it has {rank} dimensions, and signals need one")),
@@ -68,13 +72,18 @@ impl Content {
         }
         let info = tree.get_struct_type(data_type);
         let info = info.ok_or_else(|| format!("its type {data_type} is unknown"))?;
+        let mut count = 0;
         let members = info.fields.iter().map(|field| {
             let shape = Shape {
                 data_type: &field.type_id,
                 rank: field.value_rank,
                 dimensions: field.array_dimensions.as_deref(),
             };
-            let member = Self::empty(&shape, tree);
+            let member = Self::empty(&shape, tree).and_then(|member| {
+                count += member.count();
+                bounded(count)?;
+                Ok(member)
+            });
             match member.map_err(|why| format!("{}: {why}", field.name))? {
                 // async-opcua 0.19 states a wrong length for them.
                 Self::List(VariantScalarTypeId::ExtensionObject, _) => Err(format!(
@@ -86,6 +95,16 @@ impl Content {
         });
         let members = members.collect::<Result<_, _>>()?;
         Ok(Self::Structure(Arc::clone(info), members))
+    }
+
+    /// The number of values, structures and arrays.
+    fn count(&self) -> usize {
+        match self {
+            Self::Leaf(_) => 1,
+            Self::List(_, members) | Self::Structure(_, members) => {
+                1 + members.iter().map(Self::count).sum::<usize>()
+            }
+        }
     }
 
     /// The indices of the member that `steps` name. An array without a stated length grows to have it.
@@ -199,6 +218,17 @@ impl Content {
                 let pairs = elements.iter_mut().zip(&array.values);
                 pairs.into_iter().try_for_each(|(of, value)| of.take(value))
             }
+            // A ByteString is an array of bytes, too (OPC 10000-4, 5.10.4).
+            (Self::List(VariantScalarTypeId::Byte, elements), Variant::ByteString(bytes)) => {
+                let bytes = bytes.value.as_deref().unwrap_or_default();
+                if elements.len() != bytes.len() {
+                    return mismatch;
+                }
+                for (of, byte) in elements.iter_mut().zip(bytes) {
+                    *of = Self::Leaf((*byte).into());
+                }
+                Ok(())
+            }
             (Self::Structure(info, members), Variant::ExtensionObject(object)) => {
                 let written = object.inner_as::<DynamicStructure>();
                 let is_same = object
@@ -244,6 +274,14 @@ impl Content {
         }
         Ok(())
     }
+}
+
+/// Refuses a variable that would take too much memory: structures within structures multiply.
+fn bounded(count: usize) -> Result<(), String> {
+    if count > MOST {
+        return Err(format!("it has more than {MOST} values"));
+    }
+    Ok(())
 }
 
 /// The type of a value, and true for an array.

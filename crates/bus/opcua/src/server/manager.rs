@@ -324,7 +324,11 @@ impl Signals {
             let written = &node.value().value;
             let whole = match judged {
                 Judged::All(_) => None,
-                Judged::Parts(first, written) => self.places.wholes.accept(first, written),
+                // Once more, because a write before it in this request may have changed other parts.
+                Judged::Parts(first, _) => match self.judge(&space, node.value(), verdict) {
+                    Ok(Judged::Parts(_, written)) => self.places.wholes.accept(first, written),
+                    _ => None,
+                },
             };
             let value = DataValue {
                 value: whole.or_else(|| written.value.clone()),
@@ -494,8 +498,8 @@ impl InMemoryNodeManagerImpl for Signals {
         // If a service fails, every node gets its status.
         self.admits(context)?;
         let nodes = nodes_to_write.iter();
-        let signals = nodes.filter_map(|node| self.by_node.get(&node.value().node_id));
-        let signals = signals.map(|variable| variable.signal).collect();
+        let signals = nodes.flat_map(|node| self.signals(&node.value().node_id));
+        let signals = signals.collect();
         let (done, ready) = oneshot::channel();
         self.own.inbox.push(Visit::Writes(signals, done));
         // Fails if the bus has stopped.

@@ -4,7 +4,10 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use opcua::types::custom::{DataTypeTree, DynamicTypeLoader, ParentIds};
-use opcua::types::{NumericRange, StatusCode, Variant};
+use opcua::types::{
+    ContextOwned, DecodingOptions, ExtensionObject, NamespaceMap, NumericRange, StatusCode,
+    TypeLoaderCollection, Variant,
+};
 
 use tickbus_image::signal::SignalTable;
 
@@ -129,6 +132,7 @@ impl Wholes {
         let Some(value) = value else {
             return Some(Err(StatusCode::BadTypeMismatch));
         };
+        let value = &self.own(value);
         let (taken, indices) = match range {
             NumericRange::None => (content.take(value), 0..=usize::MAX),
             NumericRange::Index(at) => {
@@ -156,6 +160,38 @@ impl Wholes {
             }
         }
         Some(Ok(Written { signals, content }))
+    }
+
+    /// A value whose structures are all of this server's tree: the crate reads those of the standard, also as members of
+    /// others, as types of its own.
+    fn own(&self, value: &Variant) -> Variant {
+        match value {
+            Variant::ExtensionObject(object) => {
+                self.own_structure(object).unwrap_or_else(|| value.clone())
+            }
+            Variant::Array(array) => {
+                let mut array = array.clone();
+                for element in &mut array.values {
+                    *element = self.own(element);
+                }
+                Variant::Array(array)
+            }
+            _ => value.clone(),
+        }
+    }
+
+    fn own_structure(&self, object: &ExtensionObject) -> Option<Variant> {
+        let body = object.body.as_ref()?;
+        let mut loaders = TypeLoaderCollection::new_empty();
+        loaders.add_type_loader(DynamicTypeLoader::new(Arc::clone(&self.tree)));
+        let options = DecodingOptions::default();
+        let context = ContextOwned::new(NamespaceMap::default(), loaders, options);
+        let context = context.context();
+        let mut bytes = Vec::new();
+        body.encode_binary(&mut bytes, &context).ok()?;
+        let id = body.data_type_id().node_id;
+        let read = context.load_from_binary(&id, &mut bytes.as_slice(), None);
+        Some(read.ok()?.into())
     }
 
     /// Accepts a value that was [judged](Self::judge); returns the variable's whole value.

@@ -140,6 +140,15 @@ pub(super) fn serve(
     if count == 0 || !matches!(service, READ | CHANGE) || service == READ && !values.is_empty() {
         return Err(Refusal::Range);
     }
+    if service == CHANGE {
+        // A request that is not well formed changes nothing.
+        let mut rest = values;
+        for _ in 0..count {
+            if take(&mut rest)?.is_none() {
+                break;
+            }
+        }
+    }
     let mut blocks = Vec::new();
     let mut has_failed = false;
     let mut is_lost = false;
@@ -410,6 +419,14 @@ mod tests {
             let served = super::serve(request, &mut parameters(), 100, &mut machine);
             assert_eq!(served, Err(Refusal::Range), "{request:02X?}");
         }
+        // The values of the second parameter are missing: the first one stays, too.
+        let request = [
+            1, 2, 0, 2, 0x10, 1, 0, 10, 0, 0, 0x10, 1, 0, 10, 0, 1, 5, 1, 9, 0,
+        ];
+        let mut all = parameters();
+        let served = super::serve(&request, &mut all, 100, &mut machine);
+        assert_eq!((served, all), (Err(Refusal::Range), parameters()));
+        assert_eq!(machine.written, []);
         let mut request = vec![1, 1, 0, 39];
         for _ in 0..39 {
             request.extend([0x10, 20, 0, 11, 0, 0]);

@@ -289,6 +289,7 @@ impl<S: Service> Server<'_, S> {
             // The line is down: nothing arrives, and half a telegram is useless.
             client.begun.clear();
             client.owes_since(None, place, &mut self.clients.awaited);
+            self.service.lost(&mut client.state, &self.buffer[..count]);
             self.service.unheard(&mut client.state, now, port);
             return Ok(());
         }
@@ -379,7 +380,9 @@ impl<S: Service> Server<'_, S> {
             while client.held.front().is_some_and(|held| held.due <= now) {
                 let held = client.held.pop_front().expect("it was just there");
                 if held.is_lost(now, port) {
-                    self.service.unheard(&mut client.state, now, port);
+                    let stations = &held.stations;
+                    self.service
+                        .unanswered(&mut client.state, stations, now, port);
                 } else {
                     self.reply.extend_from_slice(&held.answer);
                 }

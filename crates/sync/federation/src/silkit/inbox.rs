@@ -17,7 +17,6 @@ const NAMING: Nanos = Nanos::from_millis(200);
 
 /// The states of a participant that matter, and of the whole simulation: `SilKit_ParticipantState`, `SilKit_SystemState`.
 mod states {
-    pub(super) const RUNNING: i16 = 50;
     pub(super) const PAUSED: i16 = 60;
     pub(super) const STOPPING: i16 = 70;
     pub(super) const STOPPED: i16 = 80;
@@ -144,12 +143,12 @@ impl Inbox {
     /// A participant, perhaps our own, has another state.
     pub(super) fn participant(&self, name: &str, code: i16, reason: &str) {
         let is_own = name == self.name;
-        self.change(|state| match code {
+        self.change(|state| {
+            // Whoever ends in a pause does not pause any longer.
+            state.paused.remove(name);
+            match code {
             states::PAUSED => {
                 state.paused.insert(name.to_owned(), reason.to_owned());
-            }
-            states::RUNNING => {
-                state.paused.remove(name);
             }
             // All others follow the one that stops, and their states may be heard first.
             states::STOPPING if !is_own && !reason.starts_with("Received new system state") => {
@@ -177,6 +176,7 @@ impl Inbox {
             }
             states::SHUTDOWN if is_own => state.is_shut = true,
             _ => {}
+            }
         });
     }
 

@@ -32,8 +32,8 @@ impl Server<'_> {
                 Phase::Running(..) if self.misses_members() && self.awaited().is_none() => {
                     self.stop_by.unwrap_or(Nanos::MAX)
                 }
-                Phase::Running(..) if self.saving.until(self.settings.hang).is_some() => {
-                    self.saving.until(self.settings.hang).unwrap_or(Nanos::MAX)
+                Phase::Running(..) if self.collecting_until().is_some() => {
+                    self.collecting_until().unwrap_or(Nanos::MAX)
                 }
                 Phase::Running(barrier, _) if barrier.state() == State::PreRead => {
                     match (self.is_paused() && !self.has_run_ahead(), &self.pace) {

@@ -1,6 +1,6 @@
 //! Runs that are saved after a step.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::Path;
 
 use tickbus_base::time::Nanos;
@@ -8,7 +8,7 @@ use tickbus_base::toml_text::printable;
 
 use super::{Out, Phase, Seat, Server};
 use crate::barrier::State;
-use crate::saved_run::{self, ClientState};
+use crate::saved_run::{self, ClientState, LONGEST_STATE};
 use crate::{SavedRun, Settings};
 
 /// The requests to save the run, and the result for the host.
@@ -20,7 +20,8 @@ pub(super) struct Saving {
     /// The step after which the run is to be saved, until that is done.
     at: Option<u64>,
     collecting: Option<Collecting>,
-    saved: Option<Saved>,
+    /// The results that the host has not taken, the oldest first.
+    saved: VecDeque<Saved>,
 }
 
 /// Clients that are asked for their states; no step begins.
@@ -43,13 +44,18 @@ impl Saving {
             is_asked: false,
             at: settings.save.as_ref().and_then(|save| save.at),
             collecting: None,
-            saved: None,
+            saved: VecDeque::new(),
         }
     }
 
     /// Another client is at this seat.
     pub(super) fn connected(&mut self, seat: usize) {
         self.able.remove(&seat);
+    }
+
+    /// True if the client at this seat can save and take over its state.
+    pub(super) fn is_able(&self, seat: usize) -> bool {
+        self.able.contains(&seat)
     }
 
     /// The client at this seat has gone.
@@ -64,19 +70,19 @@ impl Saving {
         let collecting = self.collecting.as_ref()?;
         collecting.missing.first().copied()
     }
-
-    /// When clients have had `hang` to answer.
-    pub(super) fn until(&self, hang: Nanos) -> Option<Nanos> {
-        self.collecting
-            .as_ref()
-            .map(|collecting| match collecting.missing.len() {
-                0 => Nanos::ZERO,
-                _ => collecting.since + hang,
-            })
-    }
 }
 
 impl Server<'_> {
+    /// When clients have had the time to give their states; a run that was stopped does not wait for long.
+    pub(super) fn collecting_until(&self) -> Option<Nanos> {
+        let collecting = self.saving.collecting.as_ref()?;
+        let until = collecting.since + self.settings.hang;
+        Some(match collecting.missing.len() {
+            0 => Nanos::ZERO,
+            _ => until.min(self.stop_by.unwrap_or(Nanos::MAX)),
+        })
+    }
+
     /// The client at `seat` may be asked for its state.
     pub(crate) fn can_save(&mut self, seat: usize) {
         self.saving.able.insert(seat);
@@ -84,7 +90,7 @@ impl Server<'_> {
 
     /// The run that was just saved, for the file of [`Settings::save`].
     pub(crate) fn take_saved(&mut self) -> Option<Saved> {
-        self.saving.saved.take()
+        self.saving.saved.pop_front()
     }
 
     /// The file for it.
@@ -98,12 +104,12 @@ impl Server<'_> {
             (Some(_), Phase::Running(..)) => self.saving.is_asked = true,
             (Some(_), _) => {
                 let why = "the run has not started, or has ended";
-                self.saving.saved = Some(Err(why.to_owned()));
+                self.saving.saved.push_back(Err(why.to_owned()));
             }
             (None, _) => {
                 let why =
                     "the server does not keep what a saved run needs; start it with --save-to FILE";
-                self.saving.saved = Some(Err(why.to_owned()));
+                self.saving.saved.push_back(Err(why.to_owned()));
             }
         }
     }
@@ -123,6 +129,10 @@ impl Server<'_> {
         let step = barrier.step().sequence;
         let is_due = saving.is_asked || saving.at == Some(step);
         if !is_due || barrier.state() != State::PreRead {
+            return false;
+        }
+        if self.rejoining.memory.is_none() && !self.rejoining.is_complete() {
+            // Only states can be saved: the clients of a restored run have to take over theirs first.
             return false;
         }
         saving.is_asked = false;
@@ -164,7 +174,12 @@ impl Server<'_> {
             && collecting.missing.remove(&seat)
         {
             let state = match state {
-                Ok(state) => Ok(state.to_vec()),
+                Ok(state) if state.len() <= LONGEST_STATE => Ok(state.to_vec()),
+                // One on the server's own thread; others have looked before.
+                Ok(state) => Err(format!(
+                    "its state has {} bytes, {LONGEST_STATE} at most",
+                    state.len()
+                )),
                 Err(reason) => Err(printable(reason)),
             };
             collecting.states.insert(client, state);
@@ -178,8 +193,7 @@ impl Server<'_> {
 
     /// Clients that have not answered in time have no state.
     pub(super) fn end_of_collecting(&mut self, now: Nanos) {
-        let hang = self.settings.hang;
-        if self.saving.until(hang).is_some_and(|until| now >= until)
+        if self.collecting_until().is_some_and(|until| now >= until)
             && let Some(collecting) = &mut self.saving.collecting
         {
             collecting.missing.clear();
@@ -206,10 +220,11 @@ impl Server<'_> {
                 });
             if let Some((at, reason)) = stateless {
                 let name = &barrier.declaration(at).name;
-                self.saving.saved = Some(Err(format!(
+                let why = format!(
                     "after step {step} the run is longer than the server can keep, and client \"{name}\" gave no state: \
                      {reason}"
-                )));
+                );
+                self.saving.saved.push_back(Err(why));
                 return;
             }
         }
@@ -226,7 +241,8 @@ impl Server<'_> {
             clients: states.collect(),
             memory: None,
         };
-        self.saving.saved = Some(Ok((step, saved_run::to_bytes(&run, memory))));
+        let content = saved_run::to_bytes(&run, memory);
+        self.saving.saved.push_back(Ok((step, content)));
     }
 
     /// The run has ended: what was not saved is never saved.
@@ -234,10 +250,13 @@ impl Server<'_> {
         let at = self.saving.at.take();
         if self.saving.collecting.take().is_some() {
             let why = "the run ended while its clients were asked for their states";
-            self.saving.saved = Some(Err(why.to_owned()));
+            self.saving.saved.push_back(Err(why.to_owned()));
         } else if let Some(at) = at {
             let why = format!("the run ended before the end of step {at}");
-            self.saving.saved = Some(Err(why));
+            self.saving.saved.push_back(Err(why));
+        } else if std::mem::take(&mut self.saving.is_asked) {
+            let why = "the run ended before the end of the step";
+            self.saving.saved.push_back(Err(why.to_owned()));
         }
     }
 }

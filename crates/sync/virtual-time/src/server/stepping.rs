@@ -23,7 +23,13 @@ impl Server<'_> {
                 return self.end_for(Cause::Configuration, None, mistake.to_string());
             }
         };
-        let restored = self.settings.restore.take();
+        let mut restored = self.settings.restore.take();
+        if let Some(saved) = restored.as_mut().filter(|saved| saved.memory.is_some()) {
+            // A client of an older version cannot take over a state: it runs its steps again.
+            for (client, seat) in saved.clients.iter_mut().zip(&seats) {
+                client.state = client.state.take().filter(|_| self.saving.is_able(*seat));
+            }
+        }
         let started = match &restored {
             None => (barrier.start()).map_err(|reason| (Cause::Logic, of_logic(&reason))),
             Some(saved) => (barrier.restore(saved)).map_err(|reason| (Cause::System, reason)),

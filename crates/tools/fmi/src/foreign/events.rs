@@ -149,6 +149,10 @@ impl Events {
 
     /// Ends the event in which an FMU is after its initialisation. Returns true if the FMU asks to end the run.
     pub(super) fn begin(&mut self, instance: &mut Instance) -> Result<bool, Refused> {
+        let is_too_short = |one: &Running| matches!(one.clock.timing, Timing::Periodic { interval, .. } if interval <= SAME);
+        if self.clocks.iter().any(is_too_short) {
+            return Err((Status::Error, "a clock with an interval of less than 1 ns"));
+        }
         self.settle(instance, self.start, &[])
     }
 

@@ -108,13 +108,23 @@ enum Set {
 }
 
 /// The value reference of a structural parameter, and the size that a line of the map gives it.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a whole number of 64 bits"
+)]
 fn size((name, value): (&str, TomlValue<'_>), model: &Model) -> Option<(u32, u64)> {
     let variable = &model.variables[model.position(name)?];
-    if !variable.is_structural || !value.is_integer() {
+    let written = value.written();
+    if !variable.is_structural || written.is_empty() {
         return None;
     }
-    let size = value.written().parse().ok()?;
-    Some((variable.reference, size))
+    if let Ok(size) = written.parse() {
+        return Some((variable.reference, size));
+    }
+    // As 3.0 or 0x10.
+    let number = value.number("write a whole number")?;
+    holds(ValueType::UInt64, number).then_some((variable.reference, number as u64))
 }
 
 fn parameter(name: &str, value: &TomlValue<'_>, model: &Model) -> Option<(usize, Set)> {

@@ -29,6 +29,9 @@ const BARE: [NodeId; 2] = [
 /// The deepest nesting of structures whose members can be signals.
 const DEEPEST: usize = 16;
 
+/// The most supertypes of a structure whose definition is known.
+const MOST_SUPERTYPES: usize = 100;
+
 /// The data types that files define.
 #[derive(Debug, Default)]
 pub(crate) struct Types {
@@ -79,6 +82,11 @@ impl Types {
 
     /// The complete definition of a type: its structure's inherited members come first. `None` if it is not known.
     fn definition(&self, id: &NodeId) -> Option<DataTypeDefinition> {
+        self.inherited(id, MOST_SUPERTYPES)
+    }
+
+    /// The same, with at most this many supertypes.
+    fn inherited(&self, id: &NodeId, left: usize) -> Option<DataTypeDefinition> {
         let structure = match self.own.get(id)? {
             DataTypeDefinition::Structure(structure) => structure,
             definition @ DataTypeDefinition::Enum(_) => return Some(definition.clone()),
@@ -87,7 +95,9 @@ impl Types {
         let mut fields = Vec::new();
         let mut has_optional = structure.structure_type != StructureType::Structure;
         if !BARE.contains(base) {
-            let DataTypeDefinition::Structure(inherited) = self.definition(base)? else {
+            let DataTypeDefinition::Structure(inherited) =
+                self.inherited(base, left.checked_sub(1)?)?
+            else {
                 return None;
             };
             has_optional |= inherited.structure_type != StructureType::Structure;

@@ -10,7 +10,7 @@ pub(super) struct Held {
     pub(super) due: Nanos,
     pub(super) answer: Vec<u8>,
     /// The stations that answer late; empty for an answer that waits behind another one.
-    stations: Vec<usize>,
+    pub(super) stations: Vec<usize>,
 }
 
 impl Held {

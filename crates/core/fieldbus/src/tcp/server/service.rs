@@ -57,7 +57,25 @@ pub trait Service {
     /// client. Not called for answers that had to wait for a slow client.
     fn replied(&mut self, client: &mut Self::Client, port: &mut Port);
 
+    /// These bytes of a client are lost, since the line is down; for a service whose telegrams cannot be read without
+    /// those before them.
+    fn lost(&mut self, client: &mut Self::Client, bytes: &[u8]) {
+        let _ = (client, bytes);
+    }
+
     /// Bytes from or to this client were lost at `now`, since the line was down: perhaps requests, and perhaps the client
     /// wrote; perhaps answers, none of which counts as [`replied`](Self::replied) any more.
     fn unheard(&mut self, client: &mut Self::Client, now: Nanos, port: &mut Port);
+
+    /// An answer of these stations to this client was lost at `now`, since one of them was dead.
+    fn unanswered(
+        &mut self,
+        client: &mut Self::Client,
+        stations: &[usize],
+        now: Nanos,
+        port: &mut Port,
+    ) {
+        let _ = stations;
+        self.unheard(client, now, port);
+    }
 }

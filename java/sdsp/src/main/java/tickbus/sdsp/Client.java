@@ -229,6 +229,9 @@ public final class Client {
             }
         } catch (Exception e) {
             state = reason(text(e));
+        } catch (Error e) {
+            failed(e);
+            return;
         }
         frames.begin(2 + Long.BYTES + state.length, SAVED).putLong(sequence).put((byte) (hasState ? 1 : 0)).put(state);
         sendIfPossible();

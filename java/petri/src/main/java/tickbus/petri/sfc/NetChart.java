@@ -21,17 +21,23 @@ import tickbus.petri.net.Transition;
 final class NetChart {
     private static final int MOST_MARKINGS = 1_000_000;
     /** Words of IEC 61131-3 that begin or end a part of a chart, or are operators or types. */
-    private static final Set<String> KEYWORDS = Set.of("ACTION", "AND", "AT", "BOOL", "BY", "CASE", "CONSTANT", "D", "DINT", "DO", "DS", "ELSE",
-        "ELSIF", "EXIT", "FALSE", "FOR", "FROM", "FUNCTION", "IF", "INITIAL_STEP", "INT", "L", "LINT", "MOD", "N", "NOT", "OF", "ON", "OR", "P",
-        "P0", "P1", "PRIORITY", "PROGRAM", "R", "REPEAT", "RETAIN", "RETURN", "S", "SD", "SINT", "SL", "STEP", "T", "TASK", "THEN", "TIME", "TO",
-        "TRANSITION", "TRUE", "TYPE", "UDINT", "UINT", "UNTIL", "USINT", "VAR", "WHILE", "WITH", "XOR", "X");
+    private static final Set<String> KEYWORDS = Set.of("ACTION", "AND", "ARRAY", "AT", "BOOL", "BY", "BYTE", "CASE", "CONFIGURATION", "CONSTANT", "D",
+        "DATE", "DATE_AND_TIME", "DINT", "DO", "DS", "DT", "DWORD", "ELSE", "ELSIF", "EN", "ENO", "EXIT", "FALSE", "FOR", "FROM", "FUNCTION",
+        "FUNCTION_BLOCK", "F_EDGE", "IF", "INITIAL_STEP", "INT", "INTERVAL", "L", "LINT", "LREAL", "LWORD", "MOD", "N", "NON_RETAIN", "NOT", "OF",
+        "ON", "OR", "P", "P0", "P1", "PRIORITY", "PROGRAM", "R", "READ_ONLY", "READ_WRITE", "REAL", "REPEAT", "RESOURCE", "RETAIN", "RETURN",
+        "R_EDGE", "S", "SD", "SINGLE", "SINT", "SL", "STEP", "STRING", "STRUCT", "T", "TASK", "THEN", "TIME", "TIME_OF_DAY", "TO", "TOD",
+        "TRANSITION", "TRUE", "TYPE", "UDINT", "UINT", "ULINT", "UNTIL", "USINT", "WHILE", "WITH", "WORD", "WSTRING", "X", "XOR");
+    /** The other words: ends such as END_STEP, VAR_INPUT and the like, and the types ANY. */
+    private static final String KEYWORD_WITH_MORE = "(VAR|ANY)(_.*)?|END_.*";
 
     private final PetriNet net;
     private final List<String> mistakes = new ArrayList<>();
     /** The arcs of each transition. */
     private final List<List<Arc>> arcs;
     private final Map<String, Integer> numbers = new HashMap<>();
-    private final Set<String> taken = new HashSet<>(Set.of(SfcWriter.NONE.name().toUpperCase(Locale.ROOT)));
+    /** Beside them the names of what the text has around the chart. */
+    private final Set<String> taken = new HashSet<>(
+        Set.of(SfcWriter.NONE.name().toUpperCase(Locale.ROOT), "CONFIG", "INSTANCE0", "PLC", "RESOURCE1", "TASK0"));
 
     NetChart(PetriNet net) {
         this.net = net;
@@ -127,10 +133,14 @@ final class NetChart {
         return all.isEmpty() ? "TRUE" : String.join(" AND ", all);
     }
 
+    private static boolean isKeyword(String name) {
+        return KEYWORDS.contains(name) || name.matches(KEYWORD_WITH_MORE);
+    }
+
     /** A name of letters, digits and single underscores that is not taken yet. */
     private String identifier(String name, String without) {
         String plain = name.replaceAll("[^A-Za-z0-9]+", "_").replaceAll("^_|_$", "");
-        String base = plain.isEmpty() ? without : Character.isDigit(plain.charAt(0)) || KEYWORDS.contains(plain.toUpperCase(Locale.ROOT)) ? "n_" + plain
+        String base = plain.isEmpty() ? without : Character.isDigit(plain.charAt(0)) || isKeyword(plain.toUpperCase(Locale.ROOT)) ? "n_" + plain
             : plain;
         String unique = base;
         while (!taken.add(unique.toUpperCase(Locale.ROOT))) {

@@ -68,8 +68,13 @@ fn join(folder: &Path, config: &str, name: &str, dispatcher: &str) -> Running {
     std::fs::write(&file, config).expect("a file");
     let file = file.to_str().expect("text");
     let mut bridge = bridge(&["bus", file, "--dispatcher", dispatcher]);
-    bridge.after(&format!("bridge: {name} opening: joined "));
-    bridge
+    // A bus that is fast runs before the bridge has said that it waits for it.
+    loop {
+        let state = bridge.after(&format!("bridge: {name} "));
+        if state.starts_with("opening: joined ") || state.starts_with("running") {
+            return bridge;
+        }
+    }
 }
 
 fn end(bridge: Running) {

@@ -113,6 +113,15 @@ surefire_counts() {
              END { print t - f - s, f + 0, s + 0 }'
 }
 
+# The tests that passed only when Surefire ran them again, as again_alone tells them.
+surefire_again() {
+    # shellcheck disable=SC2086 # the reports are a pattern
+    find $JAVA_REPORTS -name 'TEST-*.xml' -exec cat {} + 2>/dev/null |
+        awk '/<testcase / { name = $0; sub(/.* classname="/, "", name); sub(/".*/, "", name)
+                 test = $0; sub(/.*<testcase name="/, "", test); sub(/".*/, "", test) }
+             /<flaky(Failure|Error)/ && !told[name, test]++ { print "passed only alone: " name "." test }'
+}
+
 # The same from the last line of pytest.
 pytest_counts() {
     awk '/^=+ .*(passed|failed|error|skipped).* in [0-9.]+s/ { p = f = s = 0

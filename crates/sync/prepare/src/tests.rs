@@ -562,6 +562,7 @@ fn every_program_of_this_project_is_prepared_and_taken_back() {
         "block.st",
         "example.st",
         "line_by_hand.st",
+        "mixer.st",
         "scheduler.st",
         "timers.st",
         "valve.st",

@@ -443,11 +443,9 @@ impl Service<'_> {
             Some((station, StatusCode::from(code)))
         });
         let refused = refused.collect();
-        let late = u64::try_from(port.take_lateness().0).unwrap_or(0);
-        let late = std::time::Duration::from_nanos(late);
         Verdict {
             refused,
-            due: (!late.is_zero()).then(|| std::time::Instant::now() + late),
+            late: port.take_lateness(),
         }
     }
 

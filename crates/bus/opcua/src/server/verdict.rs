@@ -1,8 +1,9 @@
 //! The changes that faults make to the answer to a request.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use opcua::types::StatusCode;
+use tickbus_base::time::{Clock as _, Monotonic, Nanos};
 
 /// How much later than stated the runtime's timer can fire: it counts whole milliseconds, and so does the system's call
 /// that waits for it.
@@ -13,8 +14,8 @@ const COARSE: Duration = Duration::from_millis(2);
 pub(super) struct Verdict {
     /// The stations that refuse the request, with this status.
     pub(super) refused: Vec<(usize, StatusCode)>,
-    /// When the answer goes out, if not at once.
-    pub(super) due: Option<Instant>,
+    /// How much later the answer goes out.
+    pub(super) late: Nanos,
 }
 
 impl Verdict {
@@ -24,14 +25,16 @@ impl Verdict {
         found.map(|(_, status)| *status)
     }
 
-    /// Holds the answer back until it is due. The end of the wait is spent polling, because the timer is too coarse.
+    /// Holds the answer back. The end of the wait is spent polling, because the timer is too coarse.
     pub(super) async fn hold(&self) {
-        let Some(due) = self.due else {
+        if self.late == Nanos::ZERO {
             return;
-        };
-        let left = due.saturating_duration_since(Instant::now());
-        tokio::time::sleep(left.saturating_sub(COARSE)).await;
-        while Instant::now() < due {
+        }
+        let clock = Monotonic::shared();
+        let due = clock.now() + self.late;
+        let late = self.late.to_duration();
+        tokio::time::sleep(late.saturating_sub(COARSE)).await;
+        while clock.now() < due {
             tokio::task::yield_now().await;
         }
     }

@@ -14,7 +14,7 @@ use tickbus_base::toml_text::{Mistakes, shown};
 use zip::ZipArchive;
 use zip::read::ZipFile;
 
-use super::description::Model;
+use super::model::Model;
 use crate::made::Platform;
 use crate::value::Version;
 

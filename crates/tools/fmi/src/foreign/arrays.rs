@@ -3,54 +3,11 @@
 //! Indices begin at 1, as in the naming convention "structured" of the standard. Calls pass the elements in row-major
 //! order: the last index changes first (FMI 3.0, section 2.2.6).
 
-use super::description::{ForeignVariable, Model};
+use super::model::{Array, Declared, Dimension, Element, ForeignVariable, Model};
 
 /// The most elements of all arrays of a model that become variables. A larger array stays one variable, which cannot be
 /// a signal.
 const MOST: usize = 100_000;
-
-/// One dimension of an array.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Dimension {
-    /// A fixed number of elements.
-    Fixed(u64),
-    /// The value of the structural parameter with this value reference.
-    Structural(u32),
-}
-
-/// A variable as the model description has it.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Declared {
-    pub variable: ForeignVariable,
-    /// Empty for a scalar.
-    pub dimensions: Vec<Dimension>,
-    /// The start value of a structural parameter.
-    pub size: Option<u64>,
-}
-
-/// The place of an element in its array.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Element {
-    /// Counts from 0, in row-major order.
-    pub at: usize,
-    /// The number of elements of the array.
-    pub of: usize,
-}
-
-/// An array whose elements are variables.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Array {
-    /// The name of the array.
-    pub name: String,
-    /// The type of its elements.
-    pub type_name: String,
-    /// The position of the first element among the variables.
-    pub first: usize,
-    /// The number of elements.
-    pub count: usize,
-    /// The number of elements along each dimension.
-    pub shape: Vec<u64>,
-}
 
 impl Array {
     /// A sentence with the names of the elements.

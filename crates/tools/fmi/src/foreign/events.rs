@@ -5,9 +5,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::description::{Causality, ForeignVariable, Model};
 use super::library::{Instance, Interval, StepEnd};
-use super::slave::Target;
+use super::model::{Causality, Clock, ForeignVariable, Model, Timing};
+use super::target::Target;
 use crate::value::{Status, Value};
 
 /// Times that are nearer than this, in seconds, are one time: half the resolution of simulation time.
@@ -15,24 +15,6 @@ const SAME: f64 = 0.5e-9;
 
 /// The most iterations at one time, and the most parts of one step.
 const MOST: usize = 10_000;
-
-/// The times at which a clock ticks.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) enum Timing {
-    /// First after `shift`, then every `interval`, in seconds.
-    Periodic { interval: f64, shift: f64 },
-    /// The FMU is asked for the interval: at the beginning, and after each of its events.
-    Asked,
-    /// Once after each interval that the FMU states.
-    Countdown,
-}
-
-/// A clock that the importer lets tick.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct Clock {
-    pub reference: u32,
-    pub timing: Timing,
-}
 
 /// A variable that is set or read only when one of its clocks ticks.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

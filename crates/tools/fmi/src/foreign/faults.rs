@@ -5,10 +5,11 @@ use std::collections::HashSet;
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::{nearest, short_number, shown};
 
-use super::description::{Causality, ForeignVariable, Model};
 use super::join::Join;
 use super::map::holds;
-use super::slave::{Failure, Slave, Target};
+use super::model::{Causality, ForeignVariable, Model};
+use super::slave::{Failure, Slave};
+use super::target::Target;
 use crate::value::{Value, ValueType};
 
 /// A variable that a fault can change.

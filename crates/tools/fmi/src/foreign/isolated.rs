@@ -8,8 +8,9 @@ use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
 use tickbus_net::{Inbox, Message as _};
 
 use super::helper::next;
-use super::slave::{Failure, Setup, Slave, Stepped, Target};
+use super::slave::{Failure, Setup, Slave, Stepped};
 use super::talk::{Answer, Request};
+use super::target::Target;
 use crate::value::Value;
 
 /// The longest time that an FMU can take to begin, or for a step.

@@ -4,8 +4,8 @@ use tickbus_base::Mistake;
 use tickbus_base::toml_text::nearest;
 use tickbus_driver_cfg::Config;
 
-use super::description::{Causality, ForeignVariable, Model};
 use super::map::{Joined, Map};
+use super::model::{Causality, ForeignVariable, Model};
 use crate::value::Value;
 
 /// A signal or variable that is not joined: a line for people.

@@ -10,7 +10,8 @@ use super::events::EventSetup;
 use super::faults::Changeable;
 use super::join::Join;
 use super::map::Joined;
-use super::slave::{Direct, Failure, Setup, Slave, Stepped, Target};
+use super::slave::{Direct, Failure, Setup, Slave, Stepped};
+use super::target::Target;
 use crate::made::kind_of;
 use crate::value::{Value, Version};
 

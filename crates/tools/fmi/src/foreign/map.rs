@@ -8,7 +8,7 @@ use tickbus_base::toml_text::{
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::faults::unknown;
 
-use super::description::{Causality, ForeignVariable, Model};
+use super::model::{Causality, ForeignVariable, Model};
 use crate::value::{Number, Value, ValueType};
 
 /// A signal and its variable: signal = `scale` × variable + `offset`.

@@ -11,13 +11,15 @@ mod join;
 mod library;
 mod machine;
 mod map;
+mod model;
 mod slave;
 mod talk;
+mod target;
 
 pub use archive::Unpacked;
-pub use description::{Causality, ForeignVariable, Model};
 pub use helper::serve;
 pub use join::{Join, Unjoined};
 pub use machine::{Machine, MachineOptions};
 pub use map::{Joined, Map};
+pub use model::{Causality, ForeignVariable, Model};
 pub use slave::{Failure, Stepped};

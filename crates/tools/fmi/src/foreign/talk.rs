@@ -3,7 +3,8 @@
 use serde::{Deserialize, Serialize};
 use tickbus_net::Message;
 
-use super::slave::{Failure, Setup, Stepped, Target};
+use super::slave::{Failure, Setup, Stepped};
+use super::target::Target;
 use crate::value::Value;
 
 /// The most bytes of a message: enough for a hundred thousand variables and their names.

@@ -1,5 +1,6 @@
 //! `NodeSet2` files: a maker's address space, in the XML of OPC 10000-6, annex F.
 
+mod attributes;
 mod item;
 mod types;
 mod value;

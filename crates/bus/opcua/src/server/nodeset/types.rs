@@ -11,7 +11,7 @@ use opcua::types::{
 use opcua_server::address_space::{AddressSpace, HasNodeId, ImportedItem, NodeType};
 use roxmltree::Node;
 
-use super::item::{dimensions, flag, localized, number};
+use super::attributes::{dimensions, flag, localized, number};
 use super::{TagName, child};
 
 /// The structures of the standard that have no members themselves: Structure, Union.

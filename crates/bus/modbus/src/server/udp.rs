@@ -17,6 +17,10 @@ use super::units::{Carried, ServedUnits, Source};
 /// At most this many datagrams are answered before anything else is done.
 const READS: usize = 64;
 
+/// The number of the error with which Windows reports a datagram that is longer than the buffer: `WSAEMSGSIZE`. Others
+/// cut it, and have no error of this number.
+const TOO_LONG: i32 = 10_040;
+
 /// At most this many answers are held back by a fault.
 const HELD: usize = 1000;
 
@@ -109,9 +113,15 @@ impl Server<'_> {
         // One byte more than a telegram shows that a datagram is longer.
         let mut bytes = [0; ADU_LIMIT + 1];
         for _ in 0..READS {
-            // Windows reports here that an earlier answer had no receiver.
-            let Ok((count, from)) = socket.recv_from(&mut bytes) else {
-                return;
+            let (count, from) = match socket.recv_from(&mut bytes) {
+                Ok(received) => received,
+                Err(error) if error.raw_os_error() == Some(TOO_LONG) => {
+                    port.count("modbus-server.damaged");
+                    self.units.damaged(true);
+                    continue;
+                }
+                // Windows reports here that an earlier answer had no receiver.
+                Err(_) => return,
             };
             port.read(0, count);
             let Some((answer, late)) = self.datagram(from, &bytes[..count], now, port) else {

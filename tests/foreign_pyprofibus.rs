@@ -10,6 +10,8 @@ mod pty;
 
 use std::fmt::Write as _;
 use std::process::ExitCode;
+#[cfg(unix)]
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use foreign::Absent;
 #[cfg(unix)]
@@ -17,6 +19,13 @@ use foreign::machine::Machine;
 use tickbus::fieldbus::profibus::Gsd;
 #[cfg(unix)]
 use tickbus_conformance::rig::{logged, statistic};
+
+/// Each master polls without a pause, in real time where that is allowed: one at a time, or they starve each other.
+#[cfg(unix)]
+fn alone() -> MutexGuard<'static, ()> {
+    static MASTER: Mutex<()> = Mutex::new(());
+    MASTER.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 fn main() -> ExitCode {
     foreign::main(&[(
@@ -48,6 +57,7 @@ fn exchanges() -> Result<(), Absent> {
         env!("CARGO_MANIFEST_DIR"),
         "/tests/peers/profibus_master.py"
     );
+    let _alone = alone();
     let folder = tempfile::tempdir().expect("a folder");
     let encoder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/gsd/encoder.gsd");
     let by_gsd = format!("gsd = \"{encoder}\"");
@@ -112,6 +122,7 @@ fn exchanges() -> Result<(), Absent> {
 /// The IND570 of examples/devices: its weight, its indicator and its acknowledgement, as a PLC's program reads them.
 #[cfg(unix)]
 fn weighs() -> Result<(), Absent> {
+    let _alone = alone();
     let mut master = foreign::python_with("main", &["pyprofibus", "serial"])?;
     let line = pty::Line::new();
     let example = concat!(
@@ -154,6 +165,7 @@ fn records() -> Result<(), Absent> {
         env!("CARGO_MANIFEST_DIR"),
         "/tests/peers/profibus_records.py"
     );
+    let _alone = alone();
     let folder = tempfile::tempdir().expect("a folder");
     let own = folder.path().join("own.gsd");
     let own = own.to_str().expect("UTF-8");

@@ -10,7 +10,7 @@ mod open;
 #[cfg(not(feature = "page"))]
 pub(crate) use none::{Place, show, show_run, url};
 #[cfg(feature = "page")]
-pub(crate) use open::{Place, show, show_run, url};
+pub(crate) use open::{Place, options, show, show_run, url};
 
 use std::io::{self, Write as _};
 

@@ -38,6 +38,7 @@ mod progress;
 mod report;
 mod run;
 mod schema;
+mod studio;
 mod sync;
 mod test;
 mod version;
@@ -88,6 +89,7 @@ enum Command {
     Report(report::Arguments),
     Run(run::Arguments),
     Schema(schema::Arguments),
+    Studio(studio::Arguments),
     Sync(sync::Arguments),
     Test(test::Arguments),
     /// Call a plug-in for the process that starts this; not for people.
@@ -171,6 +173,7 @@ fn run(kinds: &'static Kinds) -> Outcome {
         Command::Report(arguments) => report::run(&arguments),
         Command::Run(arguments) => run::run(&arguments, kinds),
         Command::Schema(arguments) => schema::run(&arguments, kinds),
+        Command::Studio(arguments) => studio::run(&arguments, kinds),
         Command::Sync(arguments) => sync::run(&arguments, kinds),
         Command::Test(arguments) => test::run(&arguments, kinds),
         Command::PluginHelper => plugin_helper::run(),

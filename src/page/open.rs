@@ -69,8 +69,7 @@ pub(crate) fn show(
     let Some(wanted) = &config.page else {
         return Ok(None);
     };
-    let picture = wanted.picture.as_deref();
-    let picture = picture.map(|file| read_picture(config, file)).transpose()?;
+    let options = options(config)?;
     let any = "listen = \"127.0.0.1:0\" in [page]";
     let token = wanted.token_file.as_ref();
     let token = token.map(|file| config.folder().join(file));
@@ -83,14 +82,21 @@ pub(crate) fn show(
     let Some(watch) = watch() else {
         return Ok(None);
     };
-    let options = Options {
-        grace: wanted.grace,
-        picture,
-    };
     Ok(Some(Place {
         member: Some(open.page.join(watch, options)),
         open: Some(open),
     }))
+}
+
+/// Returns what the page is asked for: the picture, and how long signals stay forced.
+pub(crate) fn options(config: &Config) -> Result<Options, PageError> {
+    let wanted = config.page.clone().unwrap_or_default();
+    let picture = wanted.picture.as_deref();
+    let picture = picture.map(|file| read_picture(config, file)).transpose()?;
+    Ok(Options {
+        grace: wanted.grace,
+        picture,
+    })
 }
 
 /// Shows a run on virtual time on the page, which is served at `listen` unless there is one already.

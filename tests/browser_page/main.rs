@@ -11,6 +11,7 @@ mod webdriver;
 
 mod live;
 mod run;
+mod studio;
 
 use std::io::{BufRead as _, BufReader, Lines, Write as _};
 use std::net::TcpStream;

@@ -20,9 +20,6 @@ use crate::feed::{Feed, Viewer, json};
 use crate::guard::{Guard, Token};
 use crate::site::{Answer, Change, Site, Verb};
 
-/// The largest body of a request, in bytes.
-const BODY: usize = 4096;
-
 /// A viewer gets a message at least this often while the site answers; a page without messages knows that its contents
 /// are outdated.
 const BEAT: Duration = Duration::from_secs(1);
@@ -129,7 +126,7 @@ async fn respond(hall: &Arc<Hall>, request: Request<Incoming>) -> Result<Respons
     if token != Token::Right {
         return Err(no_token(token));
     }
-    let body = body(hall, request).await?;
+    let body = body(hall, request, hall.site.longest_body(&path)).await?;
     let (answer, outcome) = Answer::new();
     hall.site.change(Change { verb, path, body }, answer);
     let outcome = timeout(hall.patience, outcome).await;
@@ -170,6 +167,9 @@ async fn get(hall: &Arc<Hall>, path: &str, token: Token) -> Result<Response<Body
             let asset = hall.site.assets().iter().find(|asset| asset.path == path);
             if let Some(asset) = asset {
                 return Ok(full(asset.kind, asset.text));
+            }
+            if hall.site.is_private(path) && token != Token::Right {
+                return Err(no_token(token));
             }
             let (answer, document) = Answer::new();
             hall.site.get(path, answer);
@@ -230,15 +230,15 @@ impl Events {
     }
 }
 
-async fn body(hall: &Hall, request: Request<Incoming>) -> Result<String, Refusal> {
-    let body = Limited::new(request.into_body(), BODY).collect();
+async fn body(hall: &Hall, request: Request<Incoming>, longest: usize) -> Result<String, Refusal> {
+    let body = Limited::new(request.into_body(), longest).collect();
     let Ok(body) = timeout(hall.patience, body).await else {
         let text = "the body did not arrive in time; send it at once";
         return Err((StatusCode::REQUEST_TIMEOUT, text.to_owned()));
     };
     let body = body.map_err(|error| {
         if error.is::<http_body_util::LengthLimitError>() {
-            let text = format!("the body has more than {BODY} bytes; one value is sent at a time");
+            let text = format!("the body has more than {longest} bytes; send less at a time");
             (StatusCode::PAYLOAD_TOO_LARGE, text)
         } else {
             (StatusCode::BAD_REQUEST, "the body broke off".to_owned())

@@ -23,6 +23,18 @@ pub trait Site: Send + Sync + 'static {
         answer.give(None);
     }
 
+    /// True if only a viewer with the token may read this path. The files and the state are for all.
+    fn is_private(&self, path: &str) -> bool {
+        let _ = path;
+        false
+    }
+
+    /// The largest body of a change of this path, in bytes.
+    fn longest_body(&self, path: &str) -> usize {
+        let _ = path;
+        4096
+    }
+
     /// A viewer with the token was active: by a request, or by coming or going. There are now `viewers` of them.
     fn heard(&self, viewers: usize) {
         let _ = viewers;

@@ -1,0 +1,299 @@
+//! Edits of a driver.cfg, which keep its comments, its order and its columns.
+
+use serde::Deserialize;
+use tickbus_base::toml_text::{Key, Shape, shown};
+use toml_edit::{ArrayOfTables, Document, DocumentMut, Item, Table, TableLike, Value};
+
+use crate::layout;
+use crate::literal::{cell, literal, shape_of};
+use crate::places::{Step, Way};
+
+/// One change of the file.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub(crate) enum Edit {
+    /// A cell gets another text; without text the key goes. `was` is what the editor saw there.
+    Set {
+        at: Way,
+        #[serde(default)]
+        was: String,
+        to: String,
+    },
+    /// A new table in a list, such as a `[[signal]]`, at this place; its cells are keys and texts, in order.
+    Add {
+        list: String,
+        index: usize,
+        cells: Vec<(String, String)>,
+    },
+    /// A table of a list goes. `was` is the name that the editor saw in it.
+    Remove {
+        list: String,
+        index: usize,
+        was: String,
+    },
+    /// A table of a list goes to another place in it.
+    Move {
+        list: String,
+        index: usize,
+        was: String,
+        to: usize,
+    },
+    /// The whole text is replaced. `was` is the number of the version that the editor saw.
+    Text { was: u64, to: String },
+}
+
+/// Why an edit was not made.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Unmade {
+    /// Somebody else has changed the same place meanwhile.
+    Conflict(String),
+    /// The file does not have what the edit names.
+    Impossible(String),
+}
+
+/// What an edit needs to know of the keys of a driver.cfg.
+pub(crate) trait Shapes {
+    /// The keys of a table of the file, such as `driver`, or of each in a list of tables.
+    fn keys(&self, table: &str, kind: &str) -> Vec<&'static Key>;
+}
+
+/// Makes an edit in a text. Returns the new text, and what was done, in words.
+pub(crate) fn make(
+    text: &str,
+    edit: &Edit,
+    shapes: &dyn Shapes,
+) -> Result<(String, String), Unmade> {
+    // This is how a text that is no TOML gets mended.
+    if let Edit::Text { to, .. } = edit {
+        return Ok((
+            layout::ends_as(text, to.clone()),
+            "edited the text".to_owned(),
+        ));
+    }
+    let (bom, body) = match text.strip_prefix('\u{feff}') {
+        Some(body) => ("\u{feff}", body),
+        None => ("", text),
+    };
+    let parsed = Document::parse(body).map_err(|error| {
+        let what = error.message();
+        Unmade::Impossible(format!(
+            "the file is no TOML at the moment ({what}); mend that in its text first"
+        ))
+    })?;
+    let mut document = parsed.into_mut();
+    let told = match edit {
+        Edit::Set { at, was, to } => set(&mut document, at, was, to, shapes)?,
+        Edit::Add { list, index, cells } => add(&mut document, list, *index, cells, shapes)?,
+        Edit::Remove { list, index, was } => {
+            let tables = list_mut(&mut document, list)?;
+            find(tables, list, *index, was)?;
+            tables.remove(*index);
+            format!("removed {list} {}", quoted(was))
+        }
+        Edit::Move {
+            list,
+            index,
+            was,
+            to,
+        } => {
+            let tables = list_mut(&mut document, list)?;
+            find(tables, list, *index, was)?;
+            shift(tables, *index, *to);
+            format!("moved {list} {}", quoted(was))
+        }
+        Edit::Text { .. } => String::new(),
+    };
+    let made = layout::ends_as(text, document.to_string());
+    Ok((format!("{bom}{made}"), told))
+}
+
+fn quoted(text: &str) -> String {
+    format!("\"{}\"", shown(text))
+}
+
+/// A text of a cell for people: a conflict shows it.
+fn or_nothing(text: &str) -> String {
+    if text.is_empty() {
+        "nothing".to_owned()
+    } else {
+        quoted(text)
+    }
+}
+
+fn set(
+    document: &mut DocumentMut,
+    at: &[Step],
+    was: &str,
+    to: &str,
+    shapes: &dyn Shapes,
+) -> Result<String, Unmade> {
+    let [first @ .., Step::Key(name)] = at else {
+        return Err(Unmade::Impossible("an edit names no key".to_owned()));
+    };
+    let kind = kind(document);
+    let table = table_at(document, first)?;
+    let present = table.get(name).map(cell).unwrap_or_default();
+    if present != was {
+        return Err(Unmade::Conflict(format!(
+            "{name} has become {} meanwhile, and was {}",
+            or_nothing(&present),
+            or_nothing(was)
+        )));
+    }
+    let of = match first {
+        [Step::Key(table), ..] => table.as_str(),
+        _ => "",
+    };
+    let label = label(first, table, name);
+    if to.trim().is_empty() {
+        table.remove(name);
+        return Ok(format!("{label}: removed {name}"));
+    }
+    let keys = shapes.keys(of, &kind);
+    let map = [Step::Key("fieldbus".to_owned()), Step::Key("at".to_owned())];
+    let shape = if first == map {
+        Some(&Shape::Text)
+    } else {
+        shape_of(keys.iter().copied(), name)
+    };
+    let mut value = literal(shape, to);
+    match table.get_mut(name) {
+        Some(Item::Value(old)) => {
+            *value.decor_mut() = old.decor().clone();
+            *old = value;
+        }
+        Some(item) => *item = Item::Value(value),
+        None => layout::insert(table, name, value),
+    }
+    Ok(format!("{label}: {name} {}", quoted(to.trim())))
+}
+
+/// What an edit is about: the name of the signal, or the table.
+fn label(way: &[Step], table: &dyn TableLike, key: &str) -> String {
+    let name = table.get("name").map(cell).filter(|_| key != "name");
+    match (way, name) {
+        ([Step::Key(list), Step::Index(index), ..], None) => format!("{list} {}", index + 1),
+        ([_, Step::Index(_), ..], Some(name)) => shown(&name).into(),
+        _ => {
+            let keys = way.iter().filter_map(|step| match step {
+                Step::Key(name) => Some(name.as_str()),
+                Step::Index(_) => None,
+            });
+            let keys: Vec<&str> = keys.collect();
+            format!("[{}]", keys.join("."))
+        }
+    }
+}
+
+/// The kind of bus, as far as the file states one.
+pub(crate) fn kind(document: &DocumentMut) -> String {
+    let kind = document.get("fieldbus").and_then(|table| table.get("kind"));
+    kind.map(cell).unwrap_or_default()
+}
+
+/// The table at the end of this way; tables that are missing are added.
+fn table_at<'d>(
+    document: &'d mut DocumentMut,
+    way: &[Step],
+) -> Result<&'d mut dyn TableLike, Unmade> {
+    let gone = || Unmade::Conflict("this place has gone meanwhile".to_owned());
+    let mut steps = way.iter().peekable();
+    let mut table: &mut dyn TableLike = document.as_table_mut();
+    while let Some(step) = steps.next() {
+        let Step::Key(name) = step else {
+            return Err(gone());
+        };
+        if let Some(Step::Index(index)) = steps.peek() {
+            steps.next();
+            let tables = table.get_mut(name).and_then(Item::as_array_of_tables_mut);
+            table = tables
+                .and_then(|tables| tables.get_mut(*index))
+                .ok_or_else(gone)?;
+        } else {
+            let item = table
+                .entry(name)
+                .or_insert_with(|| Item::Table(Table::new()));
+            table = item.as_table_like_mut().ok_or_else(|| {
+                Unmade::Impossible(format!("{name} is no table; mend that in the text"))
+            })?;
+        }
+    }
+    Ok(table)
+}
+
+fn list_mut<'d>(
+    document: &'d mut DocumentMut,
+    list: &str,
+) -> Result<&'d mut ArrayOfTables, Unmade> {
+    let item = document
+        .entry(list)
+        .or_insert_with(|| Item::ArrayOfTables(ArrayOfTables::new()));
+    item.as_array_of_tables_mut().ok_or_else(|| {
+        Unmade::Impossible(format!(
+            "the file does not write each {list} as [[{list}]]; edit it in its text"
+        ))
+    })
+}
+
+/// Checks that the table that the editor saw is still there.
+fn find(tables: &ArrayOfTables, list: &str, index: usize, was: &str) -> Result<(), Unmade> {
+    let name = |table: &Table| table.get("name").map(cell).unwrap_or_default();
+    if tables.get(index).map(name).as_deref() == Some(was) {
+        return Ok(());
+    }
+    Err(Unmade::Conflict(format!(
+        "{list} {} is not at its place any more; look at the list, which has changed",
+        quoted(was)
+    )))
+}
+
+fn add(
+    document: &mut DocumentMut,
+    list: &str,
+    index: usize,
+    cells: &[(String, String)],
+    shapes: &dyn Shapes,
+) -> Result<String, Unmade> {
+    let kind = kind(document);
+    let keys = shapes.keys(list, &kind);
+    let tables = list_mut(document, list)?;
+    let index = index.min(tables.len());
+    let mut pairs: Vec<(String, Value)> = Vec::new();
+    let mut name = "";
+    for (key, text) in cells {
+        if key == "name" {
+            name = text;
+        }
+        if !text.trim().is_empty() && !pairs.iter().any(|(known, _)| known == key) {
+            let shape = shape_of(keys.iter().copied(), key);
+            pairs.push((key.clone(), literal(shape, text)));
+        }
+    }
+    let neighbour = index.checked_sub(1).and_then(|index| tables.get(index));
+    let table = layout::table(pairs, neighbour.or_else(|| tables.get(index)));
+    tables.push(table);
+    let last = tables.len() - 1;
+    shift(tables, last, index);
+    Ok(format!("added {list} {}", quoted(name)))
+}
+
+/// Takes a table to another place of its list, with all that is in it.
+fn shift(tables: &mut ArrayOfTables, from: usize, to: usize) {
+    let mut all: Vec<Table> = std::mem::take(tables).into_iter().collect();
+    let mut table = all.remove(from);
+    // Written behind the one before it, and not at the place where it was.
+    unplace(&mut table);
+    all.insert(to.min(all.len()), table);
+    *tables = all.into_iter().collect();
+}
+
+fn unplace(table: &mut Table) {
+    table.set_position(None);
+    for (_, item) in table.iter_mut() {
+        match item {
+            Item::Table(inner) => unplace(inner),
+            Item::ArrayOfTables(inner) => inner.iter_mut().for_each(unplace),
+            _ => {}
+        }
+    }
+}

@@ -1,0 +1,136 @@
+//! The file on the disk: read, written as a whole, and watched for changes by others.
+
+use std::fs::{self, File, Metadata};
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
+
+use tickbus_base::toml_text::load_text;
+
+/// A driver.cfg on the disk.
+#[derive(Debug)]
+pub(crate) struct OnDisk {
+    path: PathBuf,
+    /// What the file had when it was last read or written.
+    known: String,
+    stamp: Option<(SystemTime, u64)>,
+}
+
+/// Why a text was not written.
+#[derive(Debug)]
+pub(crate) enum Unwritten {
+    /// Another program has changed the file; this is its text.
+    Changed(String),
+    /// The system refused it, for this reason.
+    Refused(String),
+}
+
+impl OnDisk {
+    /// Reads the file; without one, the text is empty and the file is made by the first edit.
+    ///
+    /// # Errors
+    ///
+    /// The file cannot be read, or is no text.
+    pub(crate) fn open(path: &Path) -> Result<Self, String> {
+        // A link stays, and what it names is written.
+        let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+        let known = if path.exists() {
+            load_text(&path).map_err(|mistakes| mistakes.to_string())?
+        } else {
+            String::new()
+        };
+        let stamp = stamp(&path);
+        Ok(Self { path, known, stamp })
+    }
+
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// What the file has, as far as is known.
+    pub(crate) fn text(&self) -> &str {
+        &self.known
+    }
+
+    /// The new text if another program has changed the file; it is then known. A file that cannot be read at the moment
+    /// counts as unchanged, because editors replace files in two steps.
+    pub(crate) fn look(&mut self) -> Option<String> {
+        let now = stamp(&self.path);
+        if now == self.stamp {
+            return None;
+        }
+        self.read(now)
+    }
+
+    fn read(&mut self, now: Option<(SystemTime, u64)>) -> Option<String> {
+        let text = load_text(&self.path).ok()?;
+        self.stamp = now;
+        if text == self.known {
+            return None;
+        }
+        self.known.clone_from(&text);
+        Some(text)
+    }
+
+    /// Replaces the text of the file, unless another program has changed it.
+    pub(crate) fn write(&mut self, text: &str) -> Result<(), Unwritten> {
+        // Two changes within the resolution of the file's time are told apart by the text.
+        if let Some(theirs) = self.read(stamp(&self.path)) {
+            return Err(Unwritten::Changed(theirs));
+        }
+        self.replace(text)
+            .map_err(|error| Unwritten::Refused(error.to_string()))?;
+        text.clone_into(&mut self.known);
+        self.stamp = stamp(&self.path);
+        Ok(())
+    }
+
+    /// Writes a new file and puts it into the place of the old one, so that no moment has half of the text.
+    fn replace(&self, text: &str) -> io::Result<()> {
+        let present = fs::metadata(&self.path).map(|file| file.permissions());
+        if present.as_ref().is_ok_and(fs::Permissions::readonly) {
+            let why = "the file is read-only; allow writing, or save it elsewhere";
+            return Err(io::Error::new(io::ErrorKind::PermissionDenied, why));
+        }
+        let folder = self.path.parent().filter(|it| !it.as_os_str().is_empty());
+        let folder = folder.unwrap_or(Path::new("."));
+        let mut next = tempfile::Builder::new();
+        next.prefix(".driver-cfg-").suffix(".part");
+        let mut next = next.tempfile_in(folder)?;
+        next.write_all(text.as_bytes())?;
+        match present {
+            Ok(permissions) => next.as_file().set_permissions(permissions)?,
+            Err(_) => usual_permissions(next.as_file())?,
+        }
+        next.as_file().sync_all()?;
+        next.persist(&self.path).map_err(|error| error.error)?;
+        Ok(())
+    }
+}
+
+/// Writes a text to a new file in the system's temporary folder.
+pub(crate) fn keep(text: &str) -> io::Result<PathBuf> {
+    let mut kept = tempfile::Builder::new();
+    let mut kept = kept.prefix("driver-").suffix(".cfg").tempfile()?;
+    kept.write_all(text.as_bytes())?;
+    let (_, path) = kept.keep().map_err(|error| error.error)?;
+    Ok(path)
+}
+
+fn stamp(path: &Path) -> Option<(SystemTime, u64)> {
+    let of = |file: Metadata| Some((file.modified().ok()?, file.len()));
+    fs::metadata(path).ok().and_then(of)
+}
+
+/// Lets others read a new file: a temporary file is its owner's alone.
+#[cfg(unix)]
+fn usual_permissions(file: &File) -> io::Result<()> {
+    use std::os::unix::fs::PermissionsExt as _;
+    file.set_permissions(fs::Permissions::from_mode(0o644))
+}
+
+#[cfg(not(unix))]
+#[expect(clippy::unnecessary_wraps, reason = "as on Unix")]
+fn usual_permissions(_: &File) -> io::Result<()> {
+    Ok(())
+}

@@ -1,0 +1,26 @@
+//! The studio: a driver.cfg in a browser, edited in a table with the checker's words at the cell, and its line beside it.
+//!
+//! A [`Studio`] is a [`Site`](tickbus_web::Site) around that of the live page: what runs is shown there, forced there,
+//! and fills the values of the table. Every edit is written into the file at once, keeps comments and order, and can be
+//! undone. A file that another program changes meanwhile is read again; nothing of it is overwritten.
+
+mod assets;
+mod check;
+mod desk;
+mod edit;
+mod file;
+mod history;
+mod layout;
+mod line;
+mod literal;
+mod places;
+mod propose;
+mod sheet;
+mod site;
+mod tags;
+
+#[cfg(test)]
+mod tests;
+
+pub use line::{Machine, Opened};
+pub use site::{Settings, Studio, Unsaved};

@@ -1,0 +1,314 @@
+//! The studio as a site: its own paths begin with `/studio`, all others are the live page's.
+
+use std::fmt;
+use std::io;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use serde_json::json;
+use tickbus_base::time::Monotonic;
+use tickbus_driver_cfg::Kinds;
+use tickbus_live_page::LivePage;
+use tickbus_web::{Answer, Asset, Change, Document, Outcome, Refused, Site, State, Verb};
+
+use crate::assets::assets;
+use crate::desk::{Desk, Refusal};
+use crate::edit::Edit;
+use crate::file::keep;
+use crate::line::{Line, Machine};
+
+/// The largest body of an edit: the whole text of a file, or a list of tags in base64.
+const BODY: usize = 96 << 20;
+
+/// What a studio is opened with.
+pub struct Settings {
+    /// The driver.cfg; it need not exist yet.
+    pub path: PathBuf,
+    /// The kinds of bus that it can name.
+    pub kinds: &'static Kinds,
+    /// The machine that runs where there is no simulator.
+    pub machine: Machine,
+}
+
+impl fmt::Debug for Settings {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Settings").finish_non_exhaustive()
+    }
+}
+
+/// A file that is edited, and its line.
+#[derive(Debug)]
+pub struct Studio(Arc<Shared>);
+
+struct Shared {
+    kinds: &'static Kinds,
+    machine: Machine,
+    page: LivePage,
+    live: Arc<dyn Site>,
+    state: Mutex<Room>,
+}
+
+impl fmt::Debug for Shared {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Shared").finish_non_exhaustive()
+    }
+}
+
+struct Room {
+    desk: Desk,
+    line: Option<Line>,
+    /// The number of starts and stops.
+    turns: u64,
+    /// Why the line does not run although somebody asked for it.
+    refused: String,
+    /// True if the file has changed since the line was started.
+    started: u64,
+}
+
+/// Edits that could not be written into their file.
+#[derive(Debug)]
+pub struct Unsaved {
+    /// Why not.
+    pub why: String,
+    /// The text of the file with the edits.
+    pub text: String,
+    /// The file in the system's temporary folder that has the text now.
+    pub kept: io::Result<PathBuf>,
+}
+
+impl Studio {
+    /// Reads the file, and waits for viewers.
+    ///
+    /// # Errors
+    ///
+    /// The file cannot be read, or the system has no thread.
+    pub fn open(settings: Settings) -> Result<Self, String> {
+        let desk = Desk::open(&settings.path, settings.kinds)?;
+        let page = LivePage::open(Monotonic::shared()).map_err(|error| error.to_string())?;
+        let live = page.site();
+        let room = Room {
+            desk,
+            line: None,
+            turns: 0,
+            refused: String::new(),
+            started: 0,
+        };
+        Ok(Self(Arc::new(Shared {
+            kinds: settings.kinds,
+            machine: settings.machine,
+            page,
+            live,
+            state: Mutex::new(room),
+        })))
+    }
+
+    /// The site that the room serves.
+    pub fn site(&self) -> Arc<dyn Site> {
+        Arc::new(StudioSite(Arc::clone(&self.0)))
+    }
+
+    /// Starts the line, as the page does.
+    ///
+    /// # Errors
+    ///
+    /// Why it does not start.
+    pub fn start(&self) -> Result<(), String> {
+        self.0.start().map_err(|(_, why)| why)
+    }
+
+    /// The path of the file, as it is after links.
+    pub fn path(&self) -> PathBuf {
+        self.0.room().desk.path().to_owned()
+    }
+
+    /// Stops the line. Returns what could not be written into the file; it is then kept in another one.
+    pub fn close(self) -> Option<Unsaved> {
+        let mut room = self.0.room();
+        room.line = None;
+        if room.desk.unsaved().is_some() {
+            room.desk.save();
+        }
+        let (text, why) = room.desk.unsaved()?;
+        Some(Unsaved {
+            why: why.to_owned(),
+            kept: keep(text),
+            text: text.to_owned(),
+        })
+    }
+}
+
+impl Shared {
+    fn room(&self) -> MutexGuard<'_, Room> {
+        // An edit that panicked has changed nothing, or the whole text.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn start(&self) -> Result<(), Refusal> {
+        let mut room = self.room();
+        room.desk.look();
+        // The port of the line that runs must be free for the new one.
+        room.line = None;
+        room.turns += 1;
+        room.refused.clear();
+        if let Some((_, why)) = room.desk.unsaved() {
+            let text =
+                format!("the file could not be written ({why}); the line starts from the file");
+            room.refused.clone_from(&text);
+            return Err((409, text));
+        }
+        let mistakes = room.desk.mistakes();
+        if mistakes > 0 {
+            let text = format!("the file has mistakes ({mistakes}); they are marked");
+            room.refused.clone_from(&text);
+            return Err((409, text));
+        }
+        match Line::open(room.desk.path(), self.kinds, &self.machine, &self.page) {
+            Ok(line) => {
+                room.line = Some(line);
+                room.started = room.desk.version();
+                Ok(())
+            }
+            Err(why) => {
+                room.refused.clone_from(&why);
+                Err((409, why))
+            }
+        }
+    }
+
+    fn stop(&self) {
+        let mut room = self.room();
+        room.line = None;
+        room.turns += 1;
+        room.refused.clear();
+    }
+
+    /// The state, or its number alone for a page that has it.
+    fn state(&self, seen: &str) -> String {
+        let mut room = self.room();
+        room.desk.look();
+        if room.desk.unsaved().is_some() {
+            room.desk.save();
+        }
+        let version = format!("{}.{}", room.desk.version(), room.turns);
+        if seen == version {
+            return json!({ "state": version }).to_string();
+        }
+        let mut state = room.desk.json();
+        state["state"] = json!(version);
+        state["line"] = json!({
+            "runs": room.line.is_some(),
+            "refused": room.refused,
+            "isOld": room.line.is_some() && room.started != room.desk.version(),
+        });
+        state.to_string()
+    }
+
+    fn change(&self, change: &Change) -> Result<(), Refusal> {
+        let none = || (404, format!("{} cannot be changed", change.path));
+        let path = change.path.strip_prefix("/studio/").ok_or_else(none)?;
+        if change.verb != Verb::Put {
+            return Err((405, "use PUT".to_owned()));
+        }
+        if let Some(name) = path.strip_prefix("import/") {
+            let name = decoded(name);
+            return self.room().desk.import(&name, &change.body);
+        }
+        match (path, change.body.as_str()) {
+            ("edit", body) => {
+                let edit: Edit = serde_json::from_str(body)
+                    .map_err(|error| (400, format!("this is no edit: {error}")))?;
+                self.room().desk.edit(&edit)
+            }
+            ("undo", _) => self.room().desk.undo(),
+            ("redo", _) => self.room().desk.redo(),
+            ("save", _) => {
+                self.room().desk.save();
+                Ok(())
+            }
+            ("line", "start") => self.start(),
+            ("line", "stop") => {
+                self.stop();
+                Ok(())
+            }
+            ("line", _) => Err((400, "write start or stop".to_owned())),
+            _ => Err(none()),
+        }
+    }
+}
+
+/// A part of a path without its percent signs.
+fn decoded(text: &str) -> String {
+    String::from_utf8_lossy(&tickbus_base::percent_decoded(text)).into_owned()
+}
+
+struct StudioSite(Arc<Shared>);
+
+impl StudioSite {
+    /// Answers on a thread of its own: a file on a slow disk, or a line that closes, must not stop other viewers.
+    fn apart<T: Send + 'static>(
+        &self,
+        answer: Answer<T>,
+        make: impl FnOnce(&Shared) -> T + Send + 'static,
+    ) {
+        let shared = Arc::clone(&self.0);
+        let thread = std::thread::Builder::new().name("studio".to_owned());
+        // Without a thread the requester learns that nobody answers.
+        let _ = thread.spawn(move || answer.give(make(&shared)));
+    }
+}
+
+impl Site for StudioSite {
+    fn assets(&self) -> &[Asset] {
+        assets(self.0.live.assets())
+    }
+
+    fn is_private(&self, path: &str) -> bool {
+        path.starts_with("/studio/")
+    }
+
+    fn longest_body(&self, path: &str) -> usize {
+        if path.starts_with("/studio/") {
+            BODY
+        } else {
+            self.0.live.longest_body(path)
+        }
+    }
+
+    fn look(&self, answer: Answer<State>) {
+        self.0.live.look(answer);
+    }
+
+    fn get(&self, path: &str, answer: Answer<Option<Document>>) {
+        let json = |text| {
+            Some(Document {
+                kind: "application/json",
+                text,
+            })
+        };
+        if let Some(seen) = path.strip_prefix("/studio/state/") {
+            let seen = seen.to_owned();
+            self.apart(answer, move |shared| json(shared.state(&seen)));
+        } else if path == "/studio/schema" {
+            self.apart(answer, move |shared| {
+                json(tickbus_schema::schema(shared.kinds).to_string())
+            });
+        } else {
+            self.0.live.get(path, answer);
+        }
+    }
+
+    fn heard(&self, viewers: usize) {
+        self.0.live.heard(viewers);
+    }
+
+    fn change(&self, change: Change, answer: Answer<Outcome>) {
+        if !change.path.starts_with("/studio/") {
+            self.0.live.change(change, answer);
+            return;
+        }
+        self.apart(answer, move |shared| {
+            let done = shared.change(&change);
+            done.map_err(|(status, text)| Refused { status, text })
+        });
+    }
+}

@@ -1,0 +1,303 @@
+"use strict";
+
+// The studio's controller: reads the file's state, hands edits over, and shows the line.
+
+(() => {
+  const get = (id) => document.getElementById(id);
+  let file = null;
+  let seen = "0";
+  let mayEdit = false;
+  let isBusy = false;
+  let isAgain = false;
+
+  function say(text, isBad = false) {
+    get("told").hidden = !text;
+    get("told").textContent = text;
+    get("told").classList.toggle("bad", isBad);
+  }
+
+  /** Reads the state, unless this page has it. */
+  async function read() {
+    if (isBusy) {
+      isAgain = true;
+      return;
+    }
+    isBusy = true;
+    try {
+      const answer = await room.ask(`/studio/state/${seen}`, {});
+      if (answer.ok) {
+        const state = await answer.json();
+        if (state.state !== seen) take(state);
+      } else {
+        say((await answer.json()).text, true);
+      }
+    } catch {
+      // The tag beside the title says that nobody answers.
+    }
+    isBusy = false;
+    if (isAgain) {
+      isAgain = false;
+      await read();
+    }
+  }
+
+  function take(state) {
+    file = state;
+    seen = state.state;
+    document.title = `${state.name} – tickbus studio`;
+    get("title").textContent = state.name;
+    get("path").textContent = state.path;
+    const isSaved = state.unsaved === null;
+    get("saved").textContent = isSaved ? "saved" : "not saved";
+    get("saved").className = isSaved ? "tag good" : "tag bad";
+    get("saved").title = state.unsaved ?? "Every edit is written into the file at once";
+    if (!isSaved) say(`The file cannot be written: ${state.unsaved}. The edits are kept here, and written as soon as that works.`, true);
+    else if (state.told) say(state.told);
+    else say("");
+    for (const [id, done] of [["undo", state.undo], ["redo", state.redo]]) {
+      get(id).disabled = done === null || !mayEdit;
+      get(id).title = done ?? "";
+    }
+    const checked = state.checked.mistakes;
+    if (state.sheet) {
+      bus.show(state.sheet, checked);
+      cells.show(state.sheet, checked);
+    }
+    document.body.classList.toggle("is-broken", state.broken !== null);
+    if (state.broken !== null) {
+      say(`The file is no TOML at the moment: ${state.broken}. Mend it in its text below.`, true);
+      get("text-box").open = true;
+    }
+    showMistakes(checked, state.checked.notes);
+    showDiff(state.diff);
+    if (document.activeElement !== get("text") || get("text").value === get("text").dataset.was) {
+      get("text").value = state.text;
+      get("text").dataset.was = state.text;
+      get("text").dataset.version = state.version;
+    }
+    showLine();
+  }
+
+  function showMistakes(mistakes, notes) {
+    const items = mistakes.slice(0, 200).map(({ at, line, what, right }) => {
+      const item = document.createElement("li");
+      const button = document.createElement("button");
+      button.type = "button";
+      button.textContent = `${line ? `line ${line}: ` : ""}${what}; ${right}`;
+      button.addEventListener("click", () => go(at, line));
+      item.append(button);
+      return item;
+    });
+    for (const note of notes) items.push(Object.assign(document.createElement("li"), { className: "note", textContent: note }));
+    get("mistakes").replaceChildren(...items);
+    const count = mistakes.length;
+    get("problems-title").textContent = count === 0 ? "Check: no mistakes" : `Check: ${words.count(count, "mistake", "mistakes")}`;
+    get("problems").classList.toggle("bad", count > 0);
+  }
+
+  /** Goes to the place of a mistake. */
+  function go(at, line) {
+    const [table, place, key] = at;
+    if (table === "signal" && typeof place === "number") return cells.go(place, key ?? "name");
+    if (table === "fieldbus" && place === "at") {
+      const index = file.sheet.signals.findIndex(({ name }) => name === key);
+      if (index >= 0) return cells.go(index, "at");
+    }
+    if (bus.go(table, place)) return;
+    get("text-box").open = true;
+    const lines = get("text").value.split("\n").slice(0, Math.max(0, line - 1));
+    const start = lines.reduce((sum, it) => sum + it.length + 1, 0);
+    get("text").focus();
+    get("text").setSelectionRange(start, start);
+  }
+
+  function showDiff(diff) {
+    const lines = diff.split("\n").filter((line) => line && !line.startsWith("---") && !line.startsWith("+++"));
+    const spans = lines.map((line) => Object.assign(document.createElement("span"), {
+      className: line.startsWith("+") ? "plus" : line.startsWith("-") ? "minus" : line.startsWith("@@") ? "place" : "",
+      textContent: `${line}\n`,
+    }));
+    get("diff").replaceChildren(...spans);
+    const count = (sign) => lines.filter((line) => line.startsWith(sign)).length;
+    get("diff-count").textContent = lines.length ? `+${count("+")} −${count("-")}` : "none";
+  }
+
+  /** The lamp: what the machine's end of the line says of itself. */
+  function showLine() {
+    const [driver] = plant.drivers;
+    const line = driver?.line;
+    const runs = file?.line.runs ?? false;
+    get("start").textContent = runs ? (file.line.isOld ? "Restart with the changes" : "Restart") : "Start";
+    get("start").disabled = !mayEdit || (file?.checked.mistakes.length ?? 1) > 0;
+    get("stop").hidden = !runs;
+    get("stop").disabled = !mayEdit;
+    let state = "stopped";
+    let reason = file?.line.refused ?? "";
+    let lamp = "off";
+    if (runs) {
+      state = line?.state ?? "starting";
+      reason = line?.reason ?? "";
+      if (line?.state === "running") lamp = line.status === "stale" ? "bad" : "good";
+      else lamp = line?.state === "failed" ? "bad" : "waits";
+    } else if (reason) {
+      lamp = "bad";
+    } else if (file?.checked.mistakes.length) {
+      reason = "Correct the mistakes, and then start.";
+    }
+    get("lamp").className = lamp;
+    if (get("line-state").textContent !== state) get("line-state").textContent = state;
+    if (get("line-reason").textContent !== reason) get("line-reason").textContent = reason;
+  }
+
+  function showValues() {
+    const values = new Map();
+    for (const signal of plant.drivers[0]?.signals ?? []) values.set(signal.name, { text: `${words.value(signal)}${signal.unit ? ` ${signal.unit}` : ""}`, isStale: signal.isStale });
+    cells.values(values);
+  }
+
+  /** Requests a change of the file, and reads what came of it. */
+  async function change(path, body = "") {
+    const answer = await room.change("PUT", `/studio/${path}`, body);
+    await read();
+    if (answer === null) say("Nobody answers; the change may not have been made.", true);
+    else if (!answer.ok) say(answer.text, true);
+    return answer?.ok === true;
+  }
+
+  const edit = (what) => change("edit", JSON.stringify(what));
+
+  function set(at, was, to) {
+    return edit({ set: { at, was, to } });
+  }
+
+  function setCell(index, key, was, to) {
+    const { name } = file.sheet.signals[index];
+    if (key === "at") return set(["fieldbus", "at", name], was, to);
+    if (key === "name" && file.sheet.at[name] !== undefined && to) return rename(index, name, to);
+    return set(["signal", index, key], was, to);
+  }
+
+  /** A signal's place in the device follows its name. */
+  async function rename(index, was, to) {
+    const place = file.sheet.at[was];
+    if (await set(["signal", index, "name"], was, to) && await set(["fieldbus", "at", was], place, "")) await set(["fieldbus", "at", to], "", place);
+  }
+
+  async function add(area) {
+    const signals = file?.sheet?.signals ?? [];
+    const index = cells.chosen >= 0 ? cells.chosen + 1 : signals.length;
+    const present = new Set(signals.map(({ name }) => name));
+    let number = signals.length + 1;
+    while (present.has(`Signal ${number}`)) number += 1;
+    const given = [["name", `Signal ${number}`], ["address", file.sheet.next[`${area}X`]]];
+    const station = signals[cells.chosen]?.station;
+    if (station) given.push(["station", station]);
+    if (await edit({ add: { list: "signal", index, cells: given } })) {
+      cells.go(index, "name");
+      cells.edit();
+    }
+  }
+
+  async function move(by) {
+    const index = cells.chosen;
+    const to = index + by;
+    const signals = file?.sheet?.signals ?? [];
+    if (index < 0 || to < 0 || to >= signals.length) return;
+    await edit({ move: { list: "signal", index, was: signals[index].name, to } });
+  }
+
+  async function take_file(given) {
+    if (!given) return;
+    const bytes = new Uint8Array(await given.arrayBuffer());
+    let text = "";
+    for (let at = 0; at < bytes.length; at += 0x8000) text += String.fromCharCode(...bytes.subarray(at, at + 0x8000));
+    await change(`import/${encodeURIComponent(given.name)}`, btoa(text));
+  }
+
+  cells.begin({
+    set: setCell,
+    chosen: (text) => { get("cell-told").textContent = text; },
+    mayEdit: () => mayEdit,
+    hasPlaces: () => file?.checked.hasPlaces !== false || Object.keys(file.sheet.at).length > 0,
+  });
+
+  get("undo").addEventListener("click", () => change("undo"));
+  get("redo").addEventListener("click", () => change("redo"));
+  get("start").addEventListener("click", () => change("line", "start"));
+  get("stop").addEventListener("click", () => change("line", "stop"));
+  get("add-input").addEventListener("click", () => add("I"));
+  get("add-output").addEventListener("click", () => add("Q"));
+  get("remove").addEventListener("click", () => {
+    const signal = file?.sheet?.signals[cells.chosen];
+    if (signal) edit({ remove: { list: "signal", index: cells.chosen, was: signal.name } });
+  });
+  get("up").addEventListener("click", () => move(-1));
+  get("down").addEventListener("click", () => move(1));
+  get("filter").addEventListener("input", () => cells.filter(get("filter").value));
+  get("apply").addEventListener("click", async () => {
+    const text = get("text");
+    const was = Number(text.dataset.version);
+    text.dataset.version = file.version;
+    if (await edit({ text: { was, to: text.value } })) text.dataset.was = text.value;
+  });
+  get("import").addEventListener("click", () => get("import-file").click());
+  get("import-file").addEventListener("change", async () => {
+    await take_file(get("import-file").files[0]);
+    get("import-file").value = "";
+  });
+  window.addEventListener("dragover", (event) => {
+    event.preventDefault();
+    document.body.classList.add("is-dropping");
+  });
+  window.addEventListener("dragleave", (event) => { if (!event.relatedTarget) document.body.classList.remove("is-dropping"); });
+  window.addEventListener("drop", (event) => {
+    event.preventDefault();
+    document.body.classList.remove("is-dropping");
+    take_file(event.dataTransfer?.files[0]);
+  });
+  window.addEventListener("keydown", (event) => {
+    const isTyping = event.target.matches?.("input, textarea");
+    if (!(event.ctrlKey || event.metaKey) || isTyping) return;
+    const key = event.key.toLowerCase();
+    if (key === "z" && !event.shiftKey) change("undo");
+    else if (key === "y" || (key === "z" && event.shiftKey)) change("redo");
+    else return;
+    event.preventDefault();
+  });
+
+  let isDue = false;
+  room.listen({
+    news(text) {
+      const { isLine } = plant.hear(text);
+      if (isLine) showLine();
+      if (isDue) return;
+      isDue = true;
+      requestAnimationFrame(() => {
+        isDue = false;
+        showValues();
+      });
+    },
+    async access(isRight, refusal) {
+      mayEdit = isRight;
+      document.body.classList.toggle("read-only", !mayEdit);
+      if (!isRight) return say(refusal || "Open the address that was printed, with its token: without it the studio shows nothing.", true);
+      if (!file) {
+        const answer = await room.ask("/studio/schema", {});
+        bus.begin(await answer.json(), { set });
+      }
+      await read();
+    },
+    age(isOld) {
+      get("link").textContent = isOld ? "no connection" : "live";
+      get("link").className = isOld ? "tag bad" : "tag good";
+      document.body.classList.toggle("is-old", isOld);
+      if (!isOld && file && !cells.isEditing) read();
+    },
+  });
+
+  /** For tests. */
+  window.tickbusStudio = {
+    get file() { return file; },
+    get isBusy() { return isBusy; },
+  };
+})();

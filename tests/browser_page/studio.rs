@@ -1,0 +1,255 @@
+//! The studio: from an empty folder to a line that a foreign PLC meets, by keyboard and mouse.
+
+use std::fs;
+use std::io::{BufRead as _, BufReader};
+use std::path::PathBuf;
+use std::process::{Child, Command, Stdio};
+
+use serde_json::{Value, json};
+
+use crate::webdriver::{Browser, shoot};
+use crate::{assert_fits, assert_quiet, click, find};
+
+const ENTER: &str = "\u{e007}";
+const TAB: &str = "\u{e004}";
+const CONTROL: &str = "\u{e009}";
+
+/// A studio as a process.
+struct Studio {
+    child: Child,
+    url: String,
+    folder: tempfile::TempDir,
+}
+
+impl Studio {
+    /// Opens the studio on a file with this text; without one, on a file that is not there.
+    fn new(text: Option<&str>) -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("driver.cfg");
+        if let Some(text) = text {
+            fs::write(&file, text).expect("there is room");
+        }
+        let mut child = Command::new(env!("CARGO_BIN_EXE_tickbus"))
+            .args(["studio", "--page", "127.0.0.1:0"])
+            .arg(&file)
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("the tickbus program runs");
+        let mut lines = BufReader::new(child.stdout.take().expect("it is piped")).lines();
+        let line = find(&mut lines, "studio: ");
+        std::thread::spawn(move || lines.count());
+        let (_, url) = line.rsplit_once(" at ").expect("it has an address");
+        Self {
+            child,
+            url: url.to_owned(),
+            folder,
+        }
+    }
+
+    fn file(&self) -> PathBuf {
+        self.folder.path().join("driver.cfg")
+    }
+
+    fn text(&self) -> String {
+        fs::read_to_string(self.file()).expect("it is there")
+    }
+}
+
+impl Drop for Studio {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+fn open(studio: &Studio, width: u32, height: u32) -> Browser {
+    let browser = Browser::start(width, height);
+    browser.go(&studio.url);
+    browser.wait(READY);
+    browser
+}
+
+/// The file is shown.
+const READY: &str = "document.querySelector('#settings select') !== null";
+
+/// Types into a cell, by keys alone.
+fn fill(browser: &Browser, row: usize, key: &str, text: &str) {
+    browser.run(&format!("cells.go({row}, {})", json!(key)));
+    browser.keys(&format!("{ENTER}{text}{ENTER}"));
+    wait_cell(browser, row, key, text);
+}
+
+/// Waits until the file has this text in a cell.
+fn wait_cell(browser: &Browser, row: usize, key: &str, text: &str) {
+    let (key, text) = (json!(key), json!(text));
+    browser.wait(&format!(
+        "tickbusStudio.file?.sheet?.signals[{row}]?.[{key}] === {text} && !tickbusStudio.isBusy"
+    ));
+}
+
+/// Types into a setting of the bus or the driver.
+fn set(browser: &Browser, id: &str, text: &str) {
+    browser.run(&format!(
+        "const f = document.getElementById({}); f.focus(); f.select();",
+        json!(id)
+    ));
+    browser.keys(&format!("{text}{TAB}"));
+    let key = id.split('-').skip(1).collect::<Vec<_>>();
+    let (table, key) = (json!(key[0]), json!(key[1]));
+    browser.wait(&format!(
+        "tickbusStudio.file?.sheet?.[{table}][{key}] === {} && !tickbusStudio.isBusy",
+        json!(text)
+    ));
+}
+
+fn choose_kind(browser: &Browser, kind: &str) {
+    browser.run(&format!(
+        "const s = document.getElementById('kind'); s.value = {}; s.dispatchEvent(new Event('change'));",
+        json!(kind)
+    ));
+    browser.wait(&format!(
+        "tickbusStudio.file.sheet.kind === {}",
+        json!(kind)
+    ));
+}
+
+fn wait_line(browser: &Browser, words: &str) -> String {
+    browser.wait(&format!(
+        "`${{document.getElementById('line-state').textContent}} ${{document.getElementById('line-reason').textContent}}`.includes({})",
+        json!(words)
+    ));
+    let reason = browser.run("return document.getElementById('line-reason').textContent");
+    reason.as_str().expect("a text").to_owned()
+}
+
+fn mbpoll(address: &str, arguments: &[&str]) -> String {
+    let (host, port) = address.rsplit_once(':').expect("an address");
+    let output = Command::new("mbpoll")
+        .args(["-1", "-q", "-0", "-p", port])
+        .args(&arguments[..arguments.len().min(4)])
+        .arg(host)
+        .args(&arguments[arguments.len().min(4)..])
+        .output()
+        .expect("mbpoll is installed");
+    assert!(output.status.success(), "{output:?}");
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+#[test]
+fn an_empty_folder_becomes_a_rig_that_a_modbus_plc_meets() {
+    let studio = Studio::new(None);
+    let browser = open(&studio, 1400, 900);
+    choose_kind(&browser, "modbus-server");
+    set(&browser, "key-fieldbus-address", "127.0.0.1:0");
+    set(&browser, "key-driver-name", "Tank");
+    click(&browser, "#add-output");
+    browser.wait("cells.isEditing");
+    browser.keys(&format!("Valve{ENTER}"));
+    wait_cell(&browser, 0, "name", "Valve");
+    click(&browser, "#add-input");
+    browser.wait("cells.isEditing");
+    browser.keys(&format!("Level low{ENTER}"));
+    wait_cell(&browser, 1, "name", "Level low");
+    // A wrong address, with the checker's words at the cell, corrected there.
+    fill(&browser, 1, "address", "%IX0.9");
+    browser.run("cells.go(1, 'address')");
+    let told = browser.run("return document.getElementById('cell-told').textContent");
+    assert!(told.as_str().expect("a text").contains("%IX0.9"), "{told}");
+    assert_eq!(
+        browser.run("return document.getElementById('start').disabled"),
+        json!(true)
+    );
+    let folder = std::env::var_os("TICKBUS_SCREENSHOTS").map(PathBuf::from);
+    shoot(&browser, folder.as_deref(), "studio_mistake.png", false);
+    fill(&browser, 1, "address", "%IX0.0");
+    assert_eq!(
+        studio.text(),
+        "[driver]\nid   = 1\nname = \"Tank\"\n\n[fieldbus]\nkind = \"modbus-server\"\naddress = \"127.0.0.1:0\"\n\n\
+         [[signal]]\nname    = \"Valve\"\naddress = \"%QX0.0\"\n\n[[signal]]\nname    = \"Level low\"\naddress = \"%IX0.0\"\n"
+    );
+    click(&browser, "#start");
+    let reason = wait_line(&browser, "listening on ");
+    let address = reason.rsplit_once("listening on ").expect("an address").1;
+    let address = address.split_whitespace().next().expect("an address");
+    // The machine copies each byte of %Q to %I until there is a simulator.
+    mbpoll(address, &["-t", "0", "-r", "0", "1"]);
+    wait_line(&browser, "running");
+    browser.wait(
+        "[...document.querySelectorAll('#rows .c-value')].every((it) => it.textContent === 'TRUE')",
+    );
+    shoot(&browser, folder.as_deref(), "studio_running.png", false);
+    let read = mbpoll(address, &["-t", "1", "-r", "0"]);
+    assert!(read.contains("[0]:") && read.contains('1'), "{read}");
+    // What is forced on the live page is seen here.
+    browser.run("await room.change('PUT', '/force/1/Level%20low', 'FALSE')");
+    browser.wait("[...document.querySelectorAll('#rows .c-value')][1].textContent === 'FALSE'");
+    click(&browser, "#stop");
+    wait_line(&browser, "stopped");
+    assert_quiet(&browser);
+}
+
+/// Two editors of one file: each sees what the other does, and the same cell is a conflict.
+#[test]
+fn two_editors_and_an_editor_of_text_lose_nothing() {
+    let text = "[driver]\nid = 1\nname = \"T\"\n\n[fieldbus]\nkind = \"socket\"\naddress = \"127.0.0.1:0\"\n\n[[signal]]\nname = \"A\" # first\naddress = \"%QX0.0\"\n";
+    let studio = Studio::new(Some(text));
+    let browser = open(&studio, 1200, 800);
+    fill(&browser, 0, "name", "Pump");
+    let named = text.replace("\"A\"", "\"Pump\"");
+    assert_eq!(studio.text(), named);
+    browser.new_tab();
+    browser.go(&studio.url);
+    browser.wait(READY);
+    fill(&browser, 0, "address", "%QX0.5");
+    browser.first_tab();
+    wait_cell(&browser, 0, "address", "%QX0.5");
+    // Another program writes the file: shown here, and not overwritten by the next edit.
+    let theirs = studio.text().replace("# first", "# theirs");
+    fs::write(studio.file(), &theirs).expect("there is room");
+    fill(&browser, 0, "unit", "bar");
+    let both = theirs.replace("\"%QX0.5\"\n", "\"%QX0.5\"\nunit = \"bar\"\n");
+    assert_eq!(studio.text(), both);
+    browser.run("document.getElementById('grid').focus()");
+    browser.act(&json!([{"type": "key", "id": "keys", "actions": [
+        {"type": "keyDown", "value": CONTROL}, {"type": "keyDown", "value": "z"},
+        {"type": "keyUp", "value": "z"}, {"type": "keyUp", "value": CONTROL},
+    ]}]));
+    browser.wait("tickbusStudio.file.redo !== null");
+    assert_eq!(studio.text(), theirs);
+    assert_quiet(&browser);
+}
+
+#[test]
+fn without_its_token_the_studio_shows_nothing() {
+    let studio = Studio::new(Some("[driver]\nid = 1\nname = \"Secret plant\"\n"));
+    let browser = Browser::start(1200, 800);
+    let (plain, _) = studio.url.split_once('#').expect("it has a token");
+    browser.go(plain);
+    browser.wait("!document.getElementById('told').hidden");
+    let state = browser.run(
+        "const answer = await fetch('/studio/state/0'); return [answer.status, await answer.text()];",
+    );
+    assert_eq!(state[0], json!(401));
+    let shown = browser.run("return document.body.innerText");
+    let is_shown = |words: &str, text: &Value| text.as_str().expect("a text").contains(words);
+    assert!(!is_shown("Secret plant", &state[1]) && !is_shown("Secret plant", &shown));
+    let edited =
+        browser.run("return (await fetch('/studio/edit', {method: 'PUT', body: '{}'})).status");
+    assert_eq!(edited, json!(401));
+}
+
+/// A name from a file is text, whatever it looks like.
+#[test]
+fn the_studio_fits_a_phone_and_shows_names_as_text() {
+    let text = "[driver]\nid = 1\nname = \"T\"\n[fieldbus]\nkind = \"socket\"\n[[signal]]\nname = \"<img src=x onerror=alert(1)>\"\naddress = \"%QX0.0\"\n";
+    let studio = Studio::new(Some(text));
+    let browser = open(&studio, 390, 844);
+    browser.wait("document.querySelectorAll('#rows .row').length === 1");
+    assert_fits(&browser);
+    assert_eq!(browser.run("return document.images.length"), json!(0));
+    let name = browser.run("return document.querySelector('#rows .c-name').textContent");
+    assert_eq!(name, json!("<img src=x onerror=alert(1)>"));
+    let folder = std::env::var_os("TICKBUS_SCREENSHOTS").map(PathBuf::from);
+    shoot(&browser, folder.as_deref(), "studio_phone.png", true);
+    assert_quiet(&browser);
+}

@@ -11,12 +11,12 @@ const cells = (() => {
     { key: "name", title: "Name" },
     { key: "address", title: "Address" },
     { key: "type", title: "Type" },
-    { key: "at", title: "In the device" },
+    { key: "at", title: "In device" },
     { key: "unit", title: "Unit" },
     { key: "scale", title: "Scale" },
     { key: "latch", title: "Latch" },
     { key: "fail_safe", title: "Fail-safe" },
-    { key: "order", title: "Byte order" },
+    { key: "order", title: "Order" },
     { key: "station", title: "Station" },
   ];
   let columns = all;
@@ -68,13 +68,17 @@ const cells = (() => {
     get("head").replaceChildren(...columns.map(({ key, title }) => make("span", `c-${key}`, title, "columnheader")), make("span", "c-value", "Value", "columnheader"));
     get("grid").style.setProperty("--columns", columns.map(({ key }) => `var(--c-${key})`).join(" "));
     mark(checked);
-    choose_rows();
+    chooseRows();
     const again = shown.findIndex((index) => sheet.signals[index].name === name);
     if (again >= 0) row = again;
     row = Math.max(0, Math.min(row, shown.length - 1));
     column = Math.min(column, columns.length - 1);
     draw();
+    tellChosen();
   }
+
+  /** Shows the checker's words of the chosen cell. */
+  const tellChosen = () => tell.chosen(toldOf(shown[row], columns[column]?.key) ?? "");
 
   /** Takes the checker's words: those of a place in the device belong to the signal of its name. */
   function mark(checked) {
@@ -89,7 +93,7 @@ const cells = (() => {
     }
   }
 
-  function choose_rows() {
+  function chooseRows() {
     const signals = sheet?.signals ?? [];
     const has = (signal) => !words || `${signal.name} ${signal.address} ${signal.unit ?? ""} ${signal.type ?? ""}`.toLowerCase().includes(words);
     shown = signals.map((_, index) => index).filter((index) => has(signals[index]));
@@ -174,8 +178,7 @@ const cells = (() => {
     if (top < grid.scrollTop) grid.scrollTop = top;
     else if (top + ROW + head > grid.scrollTop + grid.clientHeight) grid.scrollTop = top + ROW + head - grid.clientHeight;
     draw();
-    const wrong = toldOf(shown[row], columns[column]?.key);
-    tell.chosen(wrong ?? "");
+    tellChosen();
   }
 
   /** Opens the chosen cell, with this text in place of its own. */
@@ -250,7 +253,7 @@ const cells = (() => {
     },
     filter(typed) {
       words = typed.trim().toLowerCase();
-      choose_rows();
+      chooseRows();
       choose(row, column);
     },
     values(given) {
@@ -264,7 +267,7 @@ const cells = (() => {
     go(index, key) {
       if (!shown.includes(index)) {
         words = get("filter").value = "";
-        choose_rows();
+        chooseRows();
       }
       choose(shown.indexOf(index), Math.max(0, columns.findIndex((it) => it.key === key)));
       get("grid").focus({ preventScroll: true });

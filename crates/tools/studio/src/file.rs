@@ -3,7 +3,6 @@
 use std::fs::{self, File, Metadata};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
-use std::time::SystemTime;
 
 use tickbus_base::toml_text::load_text;
 
@@ -13,7 +12,8 @@ pub(crate) struct OnDisk {
     path: PathBuf,
     /// What the file had when it was last read or written.
     known: String,
-    stamp: Option<(SystemTime, u64)>,
+    /// What the system said of it then.
+    seen: Option<Metadata>,
 }
 
 /// Why a text was not written.
@@ -39,8 +39,8 @@ impl OnDisk {
         } else {
             String::new()
         };
-        let stamp = stamp(&path);
-        Ok(Self { path, known, stamp })
+        let seen = fs::metadata(&path).ok();
+        Ok(Self { path, known, seen })
     }
 
     pub(crate) fn path(&self) -> &Path {
@@ -55,16 +55,18 @@ impl OnDisk {
     /// The new text if another program has changed the file; it is then known. A file that cannot be read at the moment
     /// counts as unchanged, because editors replace files in two steps.
     pub(crate) fn look(&mut self) -> Option<String> {
-        let now = stamp(&self.path);
-        if now == self.stamp {
+        let now = fs::metadata(&self.path).ok();
+        let stamp = |file: &Metadata| (file.modified().ok(), file.len());
+        if now.as_ref().map(stamp) == self.seen.as_ref().map(stamp) {
             return None;
         }
-        self.read(now)
+        self.read()
     }
 
-    fn read(&mut self, now: Option<(SystemTime, u64)>) -> Option<String> {
+    fn read(&mut self) -> Option<String> {
+        let now = fs::metadata(&self.path).ok();
         let text = load_text(&self.path).ok()?;
-        self.stamp = now;
+        self.seen = now;
         if text == self.known {
             return None;
         }
@@ -75,13 +77,13 @@ impl OnDisk {
     /// Replaces the text of the file, unless another program has changed it.
     pub(crate) fn write(&mut self, text: &str) -> Result<(), Unwritten> {
         // Two changes within the resolution of the file's time are told apart by the text.
-        if let Some(theirs) = self.read(stamp(&self.path)) {
+        if let Some(theirs) = self.read() {
             return Err(Unwritten::Changed(theirs));
         }
         self.replace(text)
             .map_err(|error| Unwritten::Refused(error.to_string()))?;
         text.clone_into(&mut self.known);
-        self.stamp = stamp(&self.path);
+        self.seen = fs::metadata(&self.path).ok();
         Ok(())
     }
 
@@ -115,11 +117,6 @@ pub(crate) fn keep(text: &str) -> io::Result<PathBuf> {
     kept.write_all(text.as_bytes())?;
     let (_, path) = kept.keep().map_err(|error| error.error)?;
     Ok(path)
-}
-
-fn stamp(path: &Path) -> Option<(SystemTime, u64)> {
-    let of = |file: Metadata| Some((file.modified().ok()?, file.len()));
-    fs::metadata(path).ok().and_then(of)
 }
 
 /// Lets others read a new file: a temporary file is its owner's alone.

@@ -206,7 +206,7 @@
     await edit({ move: { list: "signal", index, was: signals[index].name, to } });
   }
 
-  async function take_file(given) {
+  async function takeFile(given) {
     if (!given) return;
     const bytes = new Uint8Array(await given.arrayBuffer());
     let text = "";
@@ -242,7 +242,7 @@
   });
   get("import").addEventListener("click", () => get("import-file").click());
   get("import-file").addEventListener("change", async () => {
-    await take_file(get("import-file").files[0]);
+    await takeFile(get("import-file").files[0]);
     get("import-file").value = "";
   });
   window.addEventListener("dragover", (event) => {
@@ -253,7 +253,7 @@
   window.addEventListener("drop", (event) => {
     event.preventDefault();
     document.body.classList.remove("is-dropping");
-    take_file(event.dataTransfer?.files[0]);
+    takeFile(event.dataTransfer?.files[0]);
   });
   window.addEventListener("keydown", (event) => {
     const isTyping = event.target.matches?.("input, textarea");

@@ -66,7 +66,9 @@ const cells = (() => {
     sheet = newSheet;
     columns = all.filter(({ key }) => (key !== "at" || tell.hasPlaces()) && (key !== "station" || sheet?.stations.length > 1));
     get("head").replaceChildren(...columns.map(({ key, title }) => make("span", `c-${key}`, title, "columnheader")), make("span", "c-value", "Value", "columnheader"));
-    get("grid").style.setProperty("--columns", columns.map(({ key }) => `var(--c-${key})`).join(" "));
+    // The value stands behind the address, where it is seen on narrow screens as well.
+    const widths = columns.map(({ key }) => `var(--c-${key})`);
+    get("grid").style.setProperty("--columns", [...widths.slice(0, 2), "var(--c-value)", ...widths.slice(2)].join(" "));
     mark(checked);
     chooseRows();
     const again = shown.findIndex((index) => sheet.signals[index].name === name);
@@ -127,8 +129,13 @@ const cells = (() => {
       }
       made.push(rowOf(at, index));
     }
-    rows.replaceChildren(...made);
-    if (keep?.isConnected) field.focus({ preventScroll: true });
+    // Only the others are replaced: a field that leaves the page for a moment loses its focus.
+    for (const element of [...rows.children]) if (!made.includes(element)) element.remove();
+    let place = rows.firstChild;
+    for (const element of made) {
+      if (element === place) place = place.nextSibling;
+      else rows.insertBefore(element, place);
+    }
     const id = `cell-${shown[row]}-${columns[column]?.key}`;
     if (document.getElementById(id)) grid.setAttribute("aria-activedescendant", id);
     else grid.removeAttribute("aria-activedescendant");

@@ -7,8 +7,9 @@
   let file = null;
   let seen = "0";
   let mayEdit = false;
-  let isBusy = false;
-  let isAgain = false;
+  /** The request for the state that is under way, and the one after it. */
+  let reading = null;
+  let next = null;
 
   function say(text, isBad = false) {
     get("told").hidden = !text;
@@ -16,13 +17,20 @@
     get("told").classList.toggle("bad", isBad);
   }
 
-  /** Reads the state, unless this page has it. */
-  async function read() {
-    if (isBusy) {
-      isAgain = true;
-      return;
+  /** Reads the state as it is now or later: a request that is under way may have missed the last change. */
+  function read() {
+    if (!reading) {
+      reading = ask().finally(() => { reading = null; });
+      return reading;
     }
-    isBusy = true;
+    next ??= reading.then(() => {
+      next = null;
+      return read();
+    });
+    return next;
+  }
+
+  async function ask() {
     try {
       const answer = await room.ask(`/studio/state/${seen}`, {});
       if (answer.ok) {
@@ -33,11 +41,6 @@
       }
     } catch {
       // The tag beside the title says that nobody answers.
-    }
-    isBusy = false;
-    if (isAgain) {
-      isAgain = false;
-      await read();
     }
   }
 
@@ -298,6 +301,6 @@
   /** For tests. */
   window.tickbusStudio = {
     get file() { return file; },
-    get isBusy() { return isBusy; },
+    get isBusy() { return reading !== null || next !== null; },
   };
 })();

@@ -173,7 +173,7 @@ fn label(way: &[Step], table: &dyn TableLike, key: &str) -> String {
     let name = table.get("name").map(cell).filter(|_| key != "name");
     match (way, name) {
         ([Step::Key(list), Step::Index(index), ..], None) => format!("{list} {}", index + 1),
-        ([_, Step::Index(_), ..], Some(name)) => shown(&name).into(),
+        ([_, Step::Index(_), ..], Some(name)) => shown(&name),
         _ => {
             let keys = way.iter().filter_map(|step| match step {
                 Step::Key(name) => Some(name.as_str()),

@@ -7,6 +7,9 @@ use toml_edit::{Document, DocumentMut, Item, TableLike};
 use crate::literal::cell;
 use crate::propose::next;
 
+/// The tables that have cells.
+const SHOWN: [&str; 4] = ["driver", "fieldbus", "signal", "station"];
+
 /// The cells of a file.
 #[derive(Debug, Serialize)]
 pub(crate) struct Sheet {
@@ -51,7 +54,6 @@ impl Sheet {
             Some(Json::String(name)) => name,
             _ => String::new(),
         };
-        const SHOWN: [&str; 4] = ["driver", "fieldbus", "signal", "station"];
         let others = document.iter().map(|(name, _)| name);
         let others = others.filter(|name| !SHOWN.contains(name));
         Self {

@@ -1,5 +1,7 @@
 //! A list of tags from a PLC tool, dropped on the page.
 
+use std::fmt::Write as _;
+
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use tickbus_base::toml_text::{Mistakes, shown};
@@ -35,16 +37,17 @@ pub(crate) fn add(
     let new = parsed(&imported.text)?;
     let mut document = parsed(text)?;
     let (added, known) = append(&mut document, &new)?;
+    // Writing to a text cannot fail.
     let mut told = format!("imported {added} signals of {}", shown(file));
     if known > 0 {
-        told += &format!(", {known} were there already");
+        let _ = write!(told, ", {known} were there already");
     }
     if !imported.skipped.is_empty() {
         let skipped = Mistakes::of_list(file, condensed(&imported.skipped));
-        told += &format!(", {} left out:\n{skipped}", imported.skipped.len());
+        let _ = write!(told, ", {} left out:\n{skipped}", imported.skipped.len());
     }
     for note in &imported.notes {
-        told += &format!("\n{note}");
+        let _ = write!(told, "\n{note}");
     }
     let text = layout::ends_as(text, document.to_string());
     Ok((text, told))

@@ -75,14 +75,14 @@ impl Fixture {
     }
 }
 
-fn set(at: Json, was: &str, to: &str) -> Json {
+fn set(at: &Json, was: &str, to: &str) -> Json {
     json!({ "set": { "at": at, "was": was, "to": to } })
 }
 
 #[test]
 fn a_cell_changes_its_value_alone() {
     let mut fixture = Fixture::new(FILE);
-    let done = fixture.edit(set(json!(["signal", 0, "address"]), "%QX0.0", "%QX0.3"));
+    let done = fixture.edit(set(&json!(["signal", 0, "address"]), "%QX0.0", "%QX0.3"));
     assert_eq!(done, Ok(()));
     assert_eq!(fixture.text(), FILE.replace("\"%QX0.0\" ", "\"%QX0.3\" "));
 }
@@ -90,7 +90,7 @@ fn a_cell_changes_its_value_alone() {
 #[test]
 fn a_new_key_stands_in_the_column_of_its_table() {
     let mut fixture = Fixture::new(FILE);
-    let done = fixture.edit(set(json!(["signal", 2, "fail_safe"]), "", "12,5"));
+    let done = fixture.edit(set(&json!(["signal", 2, "fail_safe"]), "", "12,5"));
     assert_eq!(done, Ok(()));
     let wanted = "# see the data sheet\nfail_safe = 12.5\n";
     assert_eq!(
@@ -98,7 +98,7 @@ fn a_new_key_stands_in_the_column_of_its_table() {
         FILE.replace("# see the data sheet\n", wanted)
     );
     assert_eq!(
-        fixture.edit(set(json!(["signal", 1, "unit"]), "", "mm")),
+        fixture.edit(set(&json!(["signal", 1, "unit"]), "", "mm")),
         Ok(())
     );
     assert!(
@@ -112,7 +112,7 @@ fn a_new_key_stands_in_the_column_of_its_table() {
 fn an_emptied_cell_removes_its_key() {
     let mut fixture = Fixture::new(FILE);
     assert_eq!(
-        fixture.edit(set(json!(["signal", 0, "latch"]), "rising", "")),
+        fixture.edit(set(&json!(["signal", 0, "latch"]), "rising", "")),
         Ok(())
     );
     assert_eq!(fixture.text(), FILE.replace("latch   = \"rising\"\n", ""));
@@ -141,14 +141,14 @@ fn a_signal_is_added_removed_and_moved_with_its_comment() {
 fn the_same_cell_changed_by_two_editors_is_a_conflict() {
     let mut fixture = Fixture::new(FILE);
     let at = || json!(["signal", 0, "address"]);
-    assert_eq!(fixture.edit(set(at(), "%QX0.0", "%QX0.3")), Ok(()));
-    let second = fixture.edit(set(at(), "%QX0.0", "%QX0.4"));
+    assert_eq!(fixture.edit(set(&at(), "%QX0.0", "%QX0.3")), Ok(()));
+    let second = fixture.edit(set(&at(), "%QX0.0", "%QX0.4"));
     let (status, why) = second.expect_err("the first was there");
     assert_eq!(status, 409);
     assert!(why.contains("%QX0.3"), "{why}");
     // Another cell of the same signal is no conflict.
     assert_eq!(
-        fixture.edit(set(json!(["signal", 0, "unit"]), "", "x")),
+        fixture.edit(set(&json!(["signal", 0, "unit"]), "", "x")),
         Ok(())
     );
     let gone = json!({ "remove": { "list": "signal", "index": 0, "was": "Level" } });
@@ -159,9 +159,12 @@ fn the_same_cell_changed_by_two_editors_is_a_conflict() {
 fn every_edit_can_be_undone_and_done_again() {
     let mut fixture = Fixture::new(FILE);
     let at = |key| json!(["signal", 0, key]);
-    assert_eq!(fixture.edit(set(at("address"), "%QX0.0", "%QX0.3")), Ok(()));
+    assert_eq!(
+        fixture.edit(set(&at("address"), "%QX0.0", "%QX0.3")),
+        Ok(())
+    );
     let first = fixture.text();
-    assert_eq!(fixture.edit(set(at("unit"), "", "mm")), Ok(()));
+    assert_eq!(fixture.edit(set(&at("unit"), "", "mm")), Ok(()));
     let second = fixture.text();
     assert_eq!(fixture.desk.json()["undo"], "Belt on: unit \"mm\"");
     assert_eq!(fixture.desk.undo(), Ok(()));
@@ -179,7 +182,7 @@ fn a_file_changed_outside_is_shown_and_not_overwritten() {
     let mut fixture = Fixture::new(FILE);
     let theirs = FILE.replace("Test rig", "Another rig");
     fs::write(fixture.path(), &theirs).expect("there is room");
-    let edit = set(json!(["signal", 0, "address"]), "%QX0.0", "%QX0.3");
+    let edit = set(&json!(["signal", 0, "address"]), "%QX0.0", "%QX0.3");
     assert_eq!(fixture.edit(edit), Ok(()), "another place of the file");
     let both = theirs.replace("\"%QX0.0\" ", "\"%QX0.3\" ");
     assert_eq!(fixture.text(), both);
@@ -201,7 +204,7 @@ fn a_read_only_file_keeps_its_text_and_the_edit_is_not_lost() {
         .permissions();
     permissions.set_readonly(true);
     fs::set_permissions(fixture.path(), permissions.clone()).expect("it is ours");
-    let edit = set(json!(["signal", 0, "address"]), "%QX0.0", "%QX0.3");
+    let edit = set(&json!(["signal", 0, "address"]), "%QX0.0", "%QX0.3");
     assert_eq!(fixture.edit(edit), Ok(()));
     assert_eq!(fixture.text(), FILE);
     let json = fixture.desk.json();
@@ -224,19 +227,19 @@ fn the_checkers_words_are_at_their_cell() {
     let mut fixture = Fixture::new(FILE);
     assert_eq!(fixture.mistakes(), Vec::<Json>::new());
     let at = |key| json!(["signal", 2, key]);
-    assert_eq!(fixture.edit(set(at("type"), "INT", "INTT")), Ok(()));
+    assert_eq!(fixture.edit(set(&at("type"), "INT", "INTT")), Ok(()));
     let [mistake] = &fixture.mistakes()[..] else {
         panic!("{:?}", fixture.mistakes());
     };
     assert_eq!(mistake["at"], at("type"));
     assert!(mistake["right"].as_str().expect("a text").contains("INT"));
-    assert_eq!(fixture.edit(set(at("type"), "INTT", "INT")), Ok(()));
+    assert_eq!(fixture.edit(set(&at("type"), "INTT", "INT")), Ok(()));
     let scale = "{ raw = [0, 27648], value = [0.0, 250.0] }";
-    assert_eq!(fixture.edit(set(at("scale"), scale, "twice")), Ok(()));
+    assert_eq!(fixture.edit(set(&at("scale"), scale, "twice")), Ok(()));
     assert_eq!(fixture.mistakes()[0]["at"], at("scale"));
     assert_eq!(fixture.desk.undo(), Ok(()));
     assert_eq!(
-        fixture.edit(set(json!(["fieldbus", "kind"]), "loopback", "lopback")),
+        fixture.edit(set(&json!(["fieldbus", "kind"]), "loopback", "lopback")),
         Ok(())
     );
     assert_eq!(fixture.mistakes()[0]["at"], json!(["fieldbus", "kind"]));
@@ -253,7 +256,7 @@ fn a_text_that_is_no_toml_is_shown_with_its_place_and_can_be_mended() {
     assert_eq!(json["sheet"], Json::Null);
     assert!(json["broken"].is_string());
     assert_eq!(json["checked"]["mistakes"][0]["line"], 3);
-    let edit = set(json!(["signal", 0, "address"]), "%QX0.0", "%QX0.3");
+    let edit = set(&json!(["signal", 0, "address"]), "%QX0.0", "%QX0.3");
     assert_eq!(fixture.edit(edit).expect_err("it is no table").0, 400);
     assert_eq!(
         fixture
@@ -272,7 +275,7 @@ fn ends_of_lines_and_a_byte_order_mark_stay() {
     let windows = format!("\u{feff}{}", FILE.replace('\n', "\r\n"));
     let mut fixture = Fixture::new(&windows);
     assert_eq!(
-        fixture.edit(set(json!(["signal", 1, "unit"]), "", "mm")),
+        fixture.edit(set(&json!(["signal", 1, "unit"]), "", "mm")),
         Ok(())
     );
     let new = "address = \"%IX0.0\"\r\nunit    = \"mm\"\r\n";
@@ -331,7 +334,7 @@ fn a_file_that_is_not_there_is_made_by_the_first_edit() {
         (json!(["fieldbus", "kind"]), "loopback"),
         (json!(["fieldbus", "link"]), "rig"),
     ] {
-        let edit = serde_json::from_value(set(at, "", to)).expect("this is an edit");
+        let edit = serde_json::from_value(set(&at, "", to)).expect("this is an edit");
         assert_eq!(desk.edit(&edit), Ok(()));
     }
     let cells = json!([["name", "Pump"], ["address", "%QX0.0"]]);

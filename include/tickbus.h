@@ -116,6 +116,15 @@ typedef struct tb_event {
     int64_t time; /* on the driver's clock */
 } tb_event;
 
+/* One turn of a loop over tb_every, in nanoseconds. All members are 0 before the first turn. */
+typedef struct tb_turn {
+    int64_t time;   /* when the turn was due, since the first one: the simulation's time, if it keeps pace with the clock */
+    int64_t lag;    /* how late it begins: less than the period */
+    int64_t missed; /* how many turns before it were skipped */
+    int64_t begun;  /* for the library: when the first turn began */
+    int64_t due;    /* for the library: when the next turn is due */
+} tb_turn;
+
 /* A change of a fault of the simulation's model. */
 typedef struct tb_model_fault {
     int32_t fault; /* the fault's index among the names of tb_declare_faults */
@@ -203,13 +212,20 @@ TB_IMPORT int32_t tb_faults(tb_driver driver, char *text, size_t room);
  * forcing signals: pass it on with care. Returns as tb_statistics does. */
 TB_IMPORT int32_t tb_page(tb_driver driver, char *text, size_t room);
 
-/* Paces a loop by the computer's clock: waits until *due, then advances *due by `period` (nanoseconds, above 0). Set *due to 0
- * before the first turn, which begins at once. Returns how late this turn begins, in nanoseconds, or a status below 0. A late
- * turn does not delay the next one; missed turns are skipped.
+/* Whether the bus has ended the run on its own, as virtual time does: further ticks bring stale values. Returns 1 from then on,
+ * before that 0, or a status below 0, as for a driver that is closed. */
+TB_IMPORT int32_t tb_is_over(tb_driver driver);
+
+/* Paces a loop by the computer's clock: waits until the next turn is due, one in each `period` (nanoseconds, above 0), and
+ * describes it. The first turn begins at once. A late turn does not delay the next one; missed turns are skipped. Returns 0, or
+ * a status below 0.
  *
- *     int64_t due = 0;
- *     for (;;) { int64_t lag = tb_wait_until(&due, 10000000); ... one step of 10 ms ... } */
-TB_IMPORT int64_t tb_wait_until(int64_t *due, int64_t period);
+ *     tb_turn turn = {0};
+ *     while (tb_is_over(plc) == 0 && tb_every(10000000, &turn) == TB_FRESH) {
+ *         values->simulation_time = turn.time;
+ *         ... one step of 10 ms ...
+ *     } */
+TB_IMPORT int32_t tb_every(int64_t period, tb_turn *turn);
 
 /* The version of the library, such as "0.1.0". */
 TB_IMPORT const char *tb_version(void);

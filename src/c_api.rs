@@ -22,7 +22,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use crate::KINDS;
 use crate::page::{self, Place};
 use once_cell::sync::Lazy;
-use tickbus_base::time::{Clock as _, Monotonic, Nanos, Pace, Stop};
+use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
 use tickbus_base::toml_text::nearest;
 use tickbus_binding::{
     Device, EVENT_WORDS, EVENTS, Handles, Refusal, SPARE_SLOT, Shared, SlotKind, closing, faults,
@@ -529,33 +529,50 @@ unsafe extern "C" fn tb_page(driver: i64, into: *mut c_char, room: usize) -> i32
     })
 }
 
+/// `tb_turn` of the header.
+#[repr(C)]
+struct Turn {
+    time: i64,
+    lag: i64,
+    missed: i64,
+    /// When the first turn began, by the process's clock; 0 before it.
+    begun: i64,
+    /// When the next turn is due, by the process's clock.
+    due: i64,
+}
+
 /// # Safety
 ///
-/// `due` must be null or point to an `int64_t`.
+/// `turn` must be null or point to a `tb_turn`.
 #[unsafe(no_mangle)]
-unsafe extern "C" fn tb_wait_until(due: *mut i64, period: i64) -> i64 {
-    let mut lag = Nanos::ZERO;
-    let waited = answer(|| {
-        if due.is_null() || period <= 0 {
-            let text = "due is NULL, or period is not above 0";
-            return Err(Refusal::new(Code::BadArgument, text));
-        }
+unsafe extern "C" fn tb_every(period: i64, turn: *mut Turn) -> i32 {
+    answer(|| {
+        // SAFETY: promised by the caller.
+        let turn = unsafe { turn.as_mut() }.filter(|_| period > 0).ok_or_else(|| {
+            let text = "turn is NULL, or period is not above 0";
+            Refusal::new(Code::BadArgument, text)
+        })?;
         let clock = Monotonic::shared();
-        // SAFETY: promised by the caller, here and below.
-        let at = match unsafe { due.read() } {
-            0 => clock.now(),
-            at => Nanos(at),
-        };
-        clock.wait_until(at, &Stop::new());
-        let now = clock.now();
-        lag = now - at;
-        let mut pace = Pace::new(at, Nanos(period));
-        pace.take(now);
-        // SAFETY: as above.
-        unsafe { due.write(pace.due().0) };
+        if turn.begun == 0 {
+            // The clock begins at 0, so a turn could begin then.
+            turn.begun = clock.now().0.max(1);
+            turn.due = turn.begun;
+        }
+        let due = Nanos(turn.due);
+        clock.wait_until(due, &Stop::new());
+        let late = (clock.now() - due).max(Nanos::ZERO);
+        turn.missed = late.0 / period;
+        turn.lag = late.0 % period;
+        let due = due + Nanos(turn.missed.saturating_mul(period));
+        turn.time = due.0 - turn.begun;
+        turn.due = (due + Nanos(period)).0;
         Ok(Code::Fresh.code())
-    });
-    if waited < 0 { waited.into() } else { lag.0 }
+    })
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn tb_is_over(driver: i64) -> i32 {
+    answer(|| Ok(DRIVERS.visit(driver, |opened| opened.device.is_over())?.into()))
 }
 
 #[unsafe(no_mangle)]

@@ -20,7 +20,7 @@ use log::Level;
 use tickbus_base::os::{Library, collect_log, has_log, own_file, take_log};
 use tickbus_binding::{Handles, closing, panic_message};
 use tickbus_driver::Code;
-use tickbus_fmi::made::{Instance, folder_of};
+use tickbus_fmi::made::{EventMode, Instance, StepEnd, folder_of};
 use tickbus_fmi::{Status, Version};
 
 /// Defines functions that are one call of the instance.
@@ -45,8 +45,8 @@ macro_rules! numbers {
             // SAFETY: by the standard's header, these are null or lists with the lengths given in the call.
             let (references, values) = unsafe { (list(references, count), room(values, length)) };
             call(instance, |instance| {
-                same(references.len(), count, values.len())?;
-                instance.get(references, |at, value: $own| values[at] = value.into())
+                whole([references.len(), values.len()], [count, length])?;
+                instance.get(references, length, |at, value: $own| values[at] = value.into())
             })
         }
 
@@ -58,7 +58,7 @@ macro_rules! numbers {
             // SAFETY: as above.
             let (references, values) = unsafe { (list(references, count), list(values, length)) };
             call(instance, |instance| {
-                same(references.len(), count, values.len())?;
+                whole([references.len(), values.len()], [count, length])?;
                 instance.set(references, values.iter().map(|&value| <$own as Inner<$outer>>::inner(value)))
             })
         }
@@ -194,18 +194,23 @@ fn call(handle: *mut c_void, work: impl FnOnce(&mut Instance) -> Result<(), Stri
     })
 }
 
-/// Does one step. Returns "discard" if the bus has ended; no step follows then.
-fn step(handle: *mut c_void, from: f64, length: f64) -> c_int {
-    let mut is_over = false;
+/// Does one step. Returns a status, the way in which the step ended, and the time that the run has reached. The status
+/// is "discard" if the bus has ended; no step follows then.
+fn step(handle: *mut c_void, from: f64, length: f64) -> (c_int, StepEnd, f64) {
+    let (mut is_over, mut end, mut time) = (false, StepEnd::default(), from);
     let status = call(handle, |instance| {
-        instance.step(from, length)?;
+        let stepped = instance.step(from, length);
         is_over = instance.is_over();
+        time = instance.time();
+        end = stepped?;
         Ok(())
     });
-    if is_over {
-        return Status::Discard as c_int;
-    }
-    status
+    let status = if is_over && status == Status::Ok as c_int {
+        Status::Discard as c_int
+    } else {
+        status
+    };
+    (status, end, time)
 }
 
 /// As `call`, but compiled only once for all of the functions: there are more than a hundred.
@@ -281,6 +286,7 @@ fn instantiate(
     version: Version,
     named: Option<&Path>,
     token: &str,
+    event_mode: EventMode,
     journal: &Journal,
 ) -> *mut c_void {
     let made = catch_unwind(AssertUnwindSafe(|| {
@@ -290,7 +296,8 @@ fn instantiate(
         let folder = folder_of(named, own.as_deref()).ok_or(
             "the importing tool names no folder of resources; an FMU of tickbus has its driver.cfg there",
         )?;
-        let instance = Instance::new(version, &folder, token, &KINDS)?;
+        let mut instance = Instance::new(version, &folder, token, &KINDS)?;
+        instance.set_event_mode(event_mode);
         let tenant = Box::new(Tenant {
             instance,
             journal: journal.clone(),
@@ -316,7 +323,7 @@ fn free(handle: *mut c_void) {
     let freed = catch_unwind(AssertUnwindSafe(|| {
         closing(|| {
             INSTANCES.close(handle as i64, |mut tenant| {
-                tenant.instance.terminate();
+                tenant.instance.end();
                 tenant.journal.clone()
             })
         })
@@ -332,12 +339,6 @@ fn free(handle: *mut c_void) {
 fn set_logging(handle: *mut c_void, all: bool) -> c_int {
     let done = INSTANCES.tick(handle as i64, |tenant| tenant.journal.all = all);
     done.map_or_else(unknown, |()| Status::Ok as c_int)
-}
-
-#[expect(clippy::unnecessary_wraps, reason = "all calls have this form")]
-fn terminate(instance: &mut Instance) -> Result<(), String> {
-    instance.terminate();
-    Ok(())
 }
 
 #[expect(clippy::unnecessary_wraps, reason = "all calls have this form")]
@@ -396,15 +397,13 @@ unsafe fn room<'a, T>(first: *mut T, count: usize) -> &'a mut [T] {
     unsafe { std::slice::from_raw_parts_mut(first, count) }
 }
 
-/// Refuses lists of different lengths.
+/// Refuses lists that are missing: value references and values, with their lengths and those that the caller states.
 #[inline]
-fn same(references: usize, asked: usize, values: usize) -> Result<(), String> {
-    if references == asked && values == asked {
+fn whole(found: [usize; 2], stated: [usize; 2]) -> Result<(), String> {
+    if found == stated {
         return Ok(());
     }
-    Err(format!(
-        "{asked} variables with {references} value references and {values} values: each has one, and no pointer may be NULL"
-    ))
+    Err("a list of value references or of values is NULL; hand in both".to_owned())
 }
 
 /// Converts a value from its type in a list.
@@ -449,7 +448,8 @@ unsafe fn set_texts(
     // SAFETY: promised by the caller, here and below.
     let (references, values) = unsafe { (list(references, count), list(values, value_count)) };
     call(handle, |instance| {
-        same(references.len(), count, values.len())?;
+        whole([references.len(), values.len()], [count, value_count])?;
+        instance.check_count(references, value_count)?;
         for (&reference, &value) in references.iter().zip(values) {
             if value.is_null() {
                 return Err("a text is NULL; hand in an empty one".to_owned());
@@ -475,7 +475,9 @@ unsafe fn get_texts(
     // SAFETY: promised by the caller.
     let (references, values) = unsafe { (list(references, count), room(values, value_count)) };
     call(handle, |instance| {
-        same(references.len(), count, values.len())?;
+        whole([references.len(), values.len()], [count, value_count])?;
+        instance.check_count(references, value_count)?;
+        instance.refresh_texts();
         for (&reference, value) in references.iter().zip(values) {
             *value = instance.text(reference)?.as_ptr();
         }

@@ -314,6 +314,17 @@ extern "system" fn Java_tickbus_Tickbus_faultsNative<'local>(
     .resolve::<ThrowFieldbusException>()
 }
 
+/// `static native boolean overNative(long handle)`
+#[unsafe(no_mangle)]
+extern "system" fn Java_tickbus_Tickbus_overNative(
+    mut env: EnvUnowned<'_>,
+    _class: JClass<'_>,
+    handle: jlong,
+) -> jboolean {
+    env.with_env(|_| with(handle, |device| device.is_over()))
+        .resolve::<ThrowFieldbusException>()
+}
+
 /// `static native String pageNative(long handle)`
 #[unsafe(no_mangle)]
 extern "system" fn Java_tickbus_Tickbus_pageNative<'local>(

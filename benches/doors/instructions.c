@@ -27,9 +27,9 @@ int main(int count, char **arguments) {
     values = tb_buffer_of(driver);
     values->simulation_time = 0;
     /* Until the program's first values have arrived. */
-    int64_t due = 0;
+    tb_turn turn = {0};
     while (tb_exchange(driver) != TB_UNCHANGED)
-        if (tb_wait_until(&due, 1000000) < 0) return 1;
+        if (tb_every(1000000, &turn) < 0) return 1;
     int status = ticks(atoi(arguments[2]), strstr(arguments[1], "receive") != NULL);
     return tb_close(driver) < 0 || status != TB_UNCHANGED;
 }

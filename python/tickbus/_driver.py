@@ -100,7 +100,8 @@ class Driver(_native.Driver):
         _close_when_terminated()
 
     def every(self, period: str) -> Iterator[Turn]:
-        """Pace a loop by the computer's clock: one turn per period, such as ``"10ms"``, until the driver is closed::
+        """Pace a loop by the computer's clock: one turn per period, such as ``"10ms"``, until the driver is closed or the
+        run is over::
 
             for turn in plc.every("10ms"):
                 plc.receive(turn.time)
@@ -114,7 +115,7 @@ class Driver(_native.Driver):
         if nanos == 0:
             raise ValueError(f'"{period}" is no period; write a duration above 0, such as "10ms"')
         turns = _turns(nanos, time.monotonic_ns, time.sleep)
-        return itertools.takewhile(lambda turn: not self.closed, turns)
+        return itertools.takewhile(lambda turn: not (self.closed or self.is_over), turns)
 
     def statistics(self) -> dict[str, str]:
         """The state of the line and all counters, by key: docs/statistics.md explains them."""

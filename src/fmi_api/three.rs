@@ -5,12 +5,12 @@ use std::ffi::{CString, c_char, c_int, c_void};
 use std::path::PathBuf;
 use std::ptr::null_mut;
 
-use tickbus_fmi::made::{Instance, folder_of_uri};
+use tickbus_fmi::made::{EventMode, Instance, Updated, folder_of_uri};
 use tickbus_fmi::{Status, Version};
 
 use super::{
     Inner, Journal, Logger, LoggerOfThree, call, free, get_texts, instantiate, lacking, list,
-    reset, room, same, set_logging, set_texts, step, terminate, text,
+    reset, room, set_logging, set_texts, step, text, whole,
 };
 
 #[unsafe(no_mangle)]
@@ -29,8 +29,8 @@ unsafe extern "C" fn fmi3InstantiateCoSimulation(
     resources: *const c_char,
     _visible: bool,
     logging: bool,
-    _event_mode: bool,
-    _early_return: bool,
+    uses_events: bool,
+    early_return: bool,
     _intermediate: *const u32,
     _intermediate_count: usize,
     env: *mut c_void,
@@ -53,10 +53,16 @@ unsafe extern "C" fn fmi3InstantiateCoSimulation(
             PathBuf::from(path)
         }
     });
+    let event_mode = if uses_events {
+        EventMode::Used { early_return }
+    } else {
+        EventMode::Unused
+    };
     instantiate(
         Version::Three,
         folder.as_deref(),
         token.unwrap_or_default(),
+        event_mode,
         &journal,
     )
 }
@@ -93,15 +99,20 @@ extern "C" fn fmi3EnterInitializationMode(
     _has_tolerance: bool,
     _tolerance: f64,
     start: f64,
-    _has_stop: bool,
-    _stop: f64,
+    has_stop: bool,
+    stop: f64,
 ) -> c_int {
-    call(instance, |instance| instance.begin_at(start))
+    call(instance, |instance| {
+        instance.setup(start, has_stop.then_some(stop))?;
+        instance.enter_initialization()
+    })
 }
 
 calls! {
     fmi3ExitInitializationMode: Instance::open;
-    fmi3Terminate: terminate;
+    fmi3EnterEventMode: Instance::enter_events;
+    fmi3EnterStepMode: Instance::leave_events;
+    fmi3Terminate: Instance::terminate;
     fmi3Reset: reset;
 }
 
@@ -145,6 +156,69 @@ unsafe extern "C" fn fmi3SetString(
 
 /// # Safety
 ///
+/// `references` and `values` must be null or point to as many elements as stated.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn fmi3GetClock(
+    instance: *mut c_void,
+    references: *const u32,
+    count: usize,
+    values: *mut u8,
+) -> c_int {
+    // SAFETY: promised by the caller.
+    let (references, values) = unsafe { (list(references, count), room(values, count)) };
+    call(instance, |instance| {
+        whole([references.len(), values.len()], [count, count])?;
+        for (&reference, value) in references.iter().zip(values) {
+            *value = instance.ticks(reference)?.into();
+        }
+        Ok(())
+    })
+}
+
+/// Writes to a pointer that may be null.
+///
+/// # Safety
+///
+/// `place` must be null or point to room for a value.
+unsafe fn put<T>(place: *mut T, value: T) {
+    if !place.is_null() {
+        // SAFETY: promised by the caller.
+        unsafe { place.write(value) };
+    }
+}
+
+/// # Safety
+///
+/// Each pointer must be null or point to a value.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn fmi3UpdateDiscreteStates(
+    instance: *mut c_void,
+    needs_update: *mut bool,
+    terminate: *mut bool,
+    nominals_changed: *mut bool,
+    states_changed: *mut bool,
+    has_next: *mut bool,
+    next: *mut f64,
+) -> c_int {
+    let mut updated = Updated::default();
+    let status = call(instance, |instance| {
+        updated = instance.update()?;
+        Ok(())
+    });
+    // SAFETY: promised by the caller.
+    unsafe {
+        put(needs_update, false);
+        put(terminate, updated.terminate);
+        put(nominals_changed, false);
+        put(states_changed, false);
+        put(has_next, updated.next.is_some());
+        put(next, updated.next.unwrap_or_default());
+    }
+    status
+}
+
+/// # Safety
+///
 /// Each pointer must be null or point to a value.
 #[unsafe(no_mangle)]
 unsafe extern "C" fn fmi3DoStep(
@@ -157,22 +231,13 @@ unsafe extern "C" fn fmi3DoStep(
     early_return: *mut bool,
     last: *mut f64,
 ) -> c_int {
-    let status = step(instance, from, length);
-    let is_over = status == Status::Discard as c_int;
-    for (flag, value) in [(event, false), (terminate, is_over), (early_return, false)] {
-        if !flag.is_null() {
-            // SAFETY: promised by the caller.
-            unsafe { flag.write(value) };
-        }
-    }
-    if !last.is_null() {
-        let done = if status == Status::Ok as c_int {
-            from + length
-        } else {
-            from
-        };
-        // SAFETY: promised by the caller.
-        unsafe { last.write(done) };
+    let (status, end, time) = step(instance, from, length);
+    // SAFETY: promised by the caller.
+    unsafe {
+        put(event, end.event);
+        put(terminate, status == Status::Discard as c_int);
+        put(early_return, end.early);
+        put(last, time);
     }
     status
 }
@@ -180,7 +245,6 @@ unsafe extern "C" fn fmi3DoStep(
 lacking! {
     fmi3GetBinary,
     fmi3SetBinary,
-    fmi3GetClock,
     fmi3SetClock,
     fmi3GetFMUState,
     fmi3SetFMUState,
@@ -201,9 +265,6 @@ lacking! {
     fmi3SetShiftDecimal,
     fmi3SetShiftFraction,
     fmi3EvaluateDiscreteStates,
-    fmi3UpdateDiscreteStates,
-    fmi3EnterEventMode,
-    fmi3EnterStepMode,
     fmi3EnterConfigurationMode,
     fmi3ExitConfigurationMode,
     fmi3EnterContinuousTimeMode,

@@ -4,12 +4,12 @@
 use std::ffi::{CString, c_char, c_int, c_uint, c_void};
 use std::ptr::null_mut;
 
-use tickbus_fmi::made::{Instance, folder_of_uri};
+use tickbus_fmi::made::{EventMode, Instance, folder_of_uri};
 use tickbus_fmi::{Status, Version};
 
 use super::{
     Inner, Journal, Logger, LoggerOfTwo, call, free, get_texts, instantiate, lacking, list, reset,
-    room, same, set_logging, set_texts, step, terminate, text,
+    room, set_logging, set_texts, step, text, whole,
 };
 
 /// `fmi2Error`.
@@ -68,6 +68,7 @@ unsafe extern "C" fn fmi2Instantiate(
         Version::Two,
         folder.as_deref(),
         guid.unwrap_or_default(),
+        EventMode::Unused,
         &journal,
     )
 }
@@ -93,16 +94,18 @@ extern "C" fn fmi2SetupExperiment(
     _has_tolerance: c_int,
     _tolerance: f64,
     start: f64,
-    _has_stop: c_int,
-    _stop: f64,
+    has_stop: c_int,
+    stop: f64,
 ) -> c_int {
-    call(instance, |instance| instance.begin_at(start))
+    call(instance, |instance| {
+        instance.setup(start, (has_stop != 0).then_some(stop))
+    })
 }
 
 calls! {
-    fmi2EnterInitializationMode: |_| Ok(());
+    fmi2EnterInitializationMode: Instance::enter_initialization;
     fmi2ExitInitializationMode: Instance::open;
-    fmi2Terminate: terminate;
+    fmi2Terminate: Instance::terminate;
     fmi2Reset: reset;
 }
 
@@ -141,7 +144,7 @@ extern "C" fn fmi2DoStep(
     length: f64,
     _no_set_prior: c_int,
 ) -> c_int {
-    step(instance, from, length)
+    step(instance, from, length).0
 }
 
 /// `fmi2LastSuccessfulTime` of `fmi2StatusKind`.

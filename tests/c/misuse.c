@@ -94,16 +94,23 @@ int main(int count, char **arguments) {
     EXPECT(signal.is_written == 1 && signal.kind == TB_REAL && signal.edges == -1, 1, NULL);
 
     /* The clock of a loop: a turn begins when it is due, or late; and those that were missed are left out. */
-    int64_t due = 0, second;
-    EXPECT(tb_wait_until(NULL, 1000000), TB_BAD_ARGUMENT, "due is NULL");
-    EXPECT(tb_wait_until(&due, 0), TB_BAD_ARGUMENT, "period");
-    EXPECT(tb_wait_until(&due, 1000000) >= 0 && due > 0, 1, NULL);
-    second = due;
-    EXPECT(tb_wait_until(&due, 1000000) >= 0, 1, NULL);
-    EXPECT(due > second && (due - second) % 1000000 == 0, 1, NULL);
-    due = second - 1500000;
-    int64_t lag = tb_wait_until(&due, 1000000);
-    EXPECT(lag >= 1500000 && due >= second + 500000 && (due - second) % 1000000 == 500000, 1, NULL);
+    tb_turn turn = {0};
+    EXPECT(tb_every(1000000, NULL), TB_BAD_ARGUMENT, "turn is NULL");
+    EXPECT(tb_every(0, &turn), TB_BAD_ARGUMENT, "period");
+    EXPECT(tb_every(1000000, &turn), TB_FRESH, NULL);
+    EXPECT(turn.time % 1000000 == 0 && turn.time / 1000000 == turn.missed, 1, NULL);
+    int64_t before = turn.time;
+    EXPECT(tb_every(1000000, &turn), TB_FRESH, NULL);
+    EXPECT(turn.time == before + (turn.missed + 1) * 1000000 && turn.lag >= 0 && turn.lag < 1000000, 1, NULL);
+    /* As if the loop had stalled for 2.5 periods. */
+    before = turn.time;
+    turn.begun -= 2500000;
+    turn.due -= 2500000;
+    EXPECT(tb_every(1000000, &turn), TB_FRESH, NULL);
+    EXPECT(turn.missed >= 1 && turn.lag >= 0 && turn.lag < 1000000, 1, NULL);
+    EXPECT(turn.time == before + (turn.missed + 1) * 1000000, 1, NULL);
+    EXPECT(tb_is_over(driver), 0, NULL);
+    EXPECT(tb_is_over(driver + 1), TB_CLOSED, NULL);
     EXPECT(strcmp(tb_version(), "0.1.0"), 0, NULL);
 
     /* A text that does not fit is cut and ends with 0; the call returns its whole length. */

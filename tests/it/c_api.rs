@@ -8,6 +8,8 @@ use std::process::{Command, Output};
 
 use tickbus::driver::Code;
 
+use crate::fmi::run::with_server;
+
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 
 const TANK: &str = r#"
@@ -152,6 +154,18 @@ fn many_drivers_tick_in_one_call_each_with_its_own_time_and_status() {
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{:?} {said}", output.status);
     assert!(output.stdout.starts_with(b"many: ok"), "{said}");
+}
+
+#[test]
+fn a_loop_learns_that_the_run_is_over() {
+    let folder = folder_with_tank();
+    let program = compile(&["cc", "-std=c99"], "tests/c/over.c", folder.path());
+    let (output, _) = with_server(folder.path(), 20, || {
+        run(&program, folder.path(), &["sdsp.cfg"])
+    });
+    let told = String::from_utf8_lossy(&output.stdout);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(told, "over: turns=21 status=2\n", "{said}");
 }
 
 #[test]

@@ -48,9 +48,9 @@ int main(int count, char **arguments) {
                 tb_signal *place = side == (int)area ? &written[station][signal] : &read[station][signal];
                 if (tb_find(plc, name, place) < 0) return fail(name);
             }
-    int64_t due = 0;
+    tb_turn turn = {0};
     for (uint64_t tick = 1; !is_over; tick++) {
-        tb_wait_until(&due, period);
+        tb_every(period, &turn);
         int64_t began = now(), received = began;
         if (halves && tb_receive(plc) < 0) fail("receive");
         if (halves) received = now();

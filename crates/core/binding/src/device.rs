@@ -135,6 +135,11 @@ impl<K> Device<K> {
         self.driver.swallowed().counts().of_all()
     }
 
+    /// True if the bus has ended the run on its own, as virtual time does: further ticks bring nothing.
+    pub fn is_over(&self) -> bool {
+        self.driver.is_over()
+    }
+
     /// The configuration that the driver was opened with.
     pub fn config(&self) -> Arc<Config> {
         Arc::clone(self.driver.config())

@@ -14,6 +14,8 @@ pub struct RealTime {
     begun: Option<(Nanos, Nanos)>,
     /// The clock time lost to stalls.
     lost: Nanos,
+    /// How late the last step ended.
+    lag: Nanos,
 }
 
 impl RealTime {
@@ -23,7 +25,13 @@ impl RealTime {
             pace,
             begun: None,
             lost: Nanos::ZERO,
+            lag: Nanos::ZERO,
         }
+    }
+
+    /// Returns how late the last step ended; zero if it had to wait, or if nothing keeps it to the clock.
+    pub const fn lag(&self) -> Nanos {
+        self.lag
     }
 
     /// Returns how far simulation time has fallen behind the clock: the sum of all stalls of more than 100 ms.
@@ -45,6 +53,7 @@ impl RealTime {
             reason = "exact for 100 days"
         )]
         let due = begun + Nanos(((time - from).0 as f64 / self.pace) as i64);
+        self.lag = (now - due).max(Nanos::ZERO);
         if now > due + LATE {
             self.begun = Some((time, now));
             self.lost += now - due;
@@ -69,8 +78,9 @@ mod tests {
         assert_eq!(twice.due(ms(20), ms(1001)), Some(ms(1005)));
         // A little late: the next steps catch up.
         assert_eq!(twice.due(ms(30), ms(1012)), None);
+        assert_eq!(twice.lag(), ms(2));
         assert_eq!(twice.due(ms(50), ms(1013)), Some(ms(1020)));
-        assert_eq!(twice.lost(), Nanos::ZERO);
+        assert_eq!((twice.lag(), twice.lost()), (Nanos::ZERO, Nanos::ZERO));
         // A stall: the pace restarts here.
         assert_eq!(twice.due(ms(60), ms(2000)), None);
         assert_eq!(twice.due(ms(70), ms(2000)), Some(ms(2005)));

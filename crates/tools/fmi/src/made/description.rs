@@ -11,7 +11,8 @@ use quick_xml::escape::escape;
 use tickbus_base::time::Nanos;
 use tickbus_driver_cfg::Config;
 
-use super::variables::{Exposed, Start, Use, Variable};
+use super::exposed::Exposed;
+use super::variables::{Enumeration, Start, Use, Variable};
 use crate::value::{Value, ValueType, Version};
 
 /// The proposed step if the driver.cfg names no cycle.
@@ -59,12 +60,18 @@ pub fn model_description(config: &Config, version: Version, token: &str) -> Stri
         escape(description.as_str()),
         env!("CARGO_PKG_VERSION"),
     );
+    let events = if is_two {
+        ""
+    } else {
+        " mightReturnEarlyFromDoStep=\"true\" hasEventMode=\"true\""
+    };
     let _ = writeln!(
         text,
-        "  <CoSimulation modelIdentifier=\"{}\" canHandleVariableCommunicationStepSize=\"true\"/>",
+        "  <CoSimulation modelIdentifier=\"{}\" canHandleVariableCommunicationStepSize=\"true\"{events}/>",
         identifier(config)
     );
     units(&mut text, &exposed);
+    enumerations(&mut text, &exposed);
     text.push_str("  <LogCategories>\n");
     for (name, about) in CATEGORIES {
         let _ = writeln!(
@@ -107,6 +114,24 @@ fn units(text: &mut String, exposed: &Exposed) {
     text.push_str("  </UnitDefinitions>\n");
 }
 
+/// Writes the types of the variables that are enumerations; version 2.0 has none.
+fn enumerations(text: &mut String, exposed: &Exposed) {
+    let types = exposed.variables.iter().filter_map(|one| one.enumeration);
+    let types: Vec<&Enumeration> = types.collect();
+    if types.is_empty() {
+        return;
+    }
+    text.push_str("  <TypeDefinitions>\n");
+    for one in types {
+        let _ = writeln!(text, "    <EnumerationType name=\"{}\">", one.name);
+        for (value, item) in one.items.iter().enumerate() {
+            let _ = writeln!(text, "      <Item name=\"{item}\" value=\"{value}\"/>");
+        }
+        text.push_str("    </EnumerationType>\n");
+    }
+    text.push_str("  </TypeDefinitions>\n");
+}
+
 /// Returns causality, variability, and `initial`.
 fn usage(variable: &Variable) -> &'static str {
     let is_float = variable.value_type.is_float();
@@ -118,26 +143,39 @@ fn usage(variable: &Variable) -> &'static str {
         Use::Parameter => "causality=\"parameter\" variability=\"fixed\" initial=\"exact\"",
         Use::Input => "causality=\"input\" variability=\"discrete\"",
         Use::Output => "causality=\"output\" variability=\"discrete\" initial=\"exact\"",
+        Use::Clock => {
+            "causality=\"output\" variability=\"discrete\" intervalVariability=\"triggered\""
+        }
     }
 }
 
 fn start(variable: &Variable) -> Option<String> {
-    Some(match &variable.start {
-        Start::None => return None,
-        Start::Text(text) => escape(text.as_str()).into_owned(),
-        Start::Number(value) => match (variable.value_type, *value) {
-            (ValueType::Boolean, value) => (value.real() != 0.0).to_string(),
-            #[expect(
-                clippy::cast_possible_truncation,
-                reason = "the value as the variable has it"
-            )]
-            (ValueType::Float32, value) => format!("{:?}", value.real() as f32),
-            (ValueType::Float64, value) => format!("{:?}", value.real()),
-            (_, Value::Signed(value)) => value.to_string(),
-            (_, Value::Unsigned(value)) => value.to_string(),
-            (_, value) => format!("{:.0}", value.real()),
-        },
-    })
+    match &variable.start {
+        Start::None => None,
+        Start::Text(text) => Some(escape(text.as_str()).into_owned()),
+        Start::Numbers(values) => {
+            let values = values.iter();
+            let values: Vec<_> = values
+                .map(|value| number(variable.value_type, *value))
+                .collect();
+            Some(values.join(" "))
+        }
+    }
+}
+
+fn number(value_type: ValueType, value: Value) -> String {
+    match (value_type, value) {
+        (ValueType::Boolean, value) => (value.real() != 0.0).to_string(),
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "the value as the variable has it"
+        )]
+        (ValueType::Float32, value) => format!("{:?}", value.real() as f32),
+        (ValueType::Float64, value) => format!("{:?}", value.real()),
+        (_, Value::Signed(value)) => value.to_string(),
+        (_, Value::Unsigned(value)) => value.to_string(),
+        (_, value) => format!("{:.0}", value.real()),
+    }
 }
 
 fn unit(variable: &Variable) -> String {
@@ -162,28 +200,40 @@ fn variable_of_two(text: &mut String, variable: &Variable) {
 }
 
 fn variable_of_three(text: &mut String, variable: &Variable) {
+    let element = variable.element();
     let _ = write!(
         text,
-        "    <{0} name=\"{1}\" valueReference=\"{2}\" {3} description=\"{4}\"{5}",
-        variable.value_type.name(),
+        "    <{element} name=\"{}\" valueReference=\"{}\" {} description=\"{}\"{}",
         escape(variable.name.as_str()),
         variable.reference,
         usage(variable),
         escape(variable.description.as_str()),
         unit(variable),
     );
-    let _ = match (start(variable), variable.value_type) {
-        (None, _) => writeln!(text, "/>"),
-        (Some(start), ValueType::String) => {
-            writeln!(text, "><Start value=\"{start}\"/></String>")
-        }
-        (Some(start), _) => writeln!(text, " start=\"{start}\"/>"),
+    if let Some(declared) = variable.enumeration {
+        let _ = write!(text, " declaredType=\"{}\"", declared.name);
+    }
+    let start = start(variable);
+    let mut inner: String = (variable.sizes.iter())
+        .map(|size| format!("<Dimension start=\"{size}\"/>"))
+        .collect();
+    if variable.value_type == ValueType::String
+        && let Some(start) = &start
+    {
+        let _ = write!(inner, "<Start value=\"{start}\"/>");
+    } else if let Some(start) = start {
+        let _ = write!(text, " start=\"{start}\"");
+    }
+    let _ = if inner.is_empty() {
+        writeln!(text, "/>")
+    } else {
+        writeln!(text, ">{inner}</{element}>")
     };
 }
 
 fn structure(text: &mut String, exposed: &Exposed, version: Version) {
     let outputs = exposed.variables.iter().enumerate();
-    let outputs = outputs.filter(|(_, variable)| variable.usage == Use::Output);
+    let outputs = outputs.filter(|(_, one)| matches!(one.usage, Use::Output | Use::Clock));
     text.push_str("  <ModelStructure>\n");
     if version == Version::Two {
         text.push_str("    <Outputs>\n");
@@ -204,6 +254,14 @@ fn structure(text: &mut String, exposed: &Exposed, version: Version) {
     }
     if version == Version::Two {
         text.push_str("    </Outputs>\n");
+    }
+    // An output without a start value.
+    for clock in (exposed.variables.iter()).filter(|one| one.usage == Use::Clock) {
+        let reference = clock.reference;
+        let _ = writeln!(
+            text,
+            "    <InitialUnknown valueReference=\"{reference}\" dependencies=\"\"/>"
+        );
     }
     text.push_str("  </ModelStructure>\n");
 }

@@ -131,7 +131,7 @@ Bus cards need the drivers of their vendors, isolated plug-ins the tickbus comma
 
 fn notes_on(config: &Config) -> Vec<String> {
     let mut notes = Vec::new();
-    if !super::variables::is_stepped(config) {
+    if !super::own::is_stepped(config) {
         notes.push(format!(
             "the bus \"{}\" runs in real time, so the parameter \"pace\" begins at 1: a step waits until the clock is there; \
              set it to 0 if the importing tool keeps to the clock",

@@ -1,13 +1,8 @@
 //! The variables of the FMU made from a driver.cfg.
 
-use std::ops::DerefMut as _;
+use tickbus_base::time::Nanos;
 
-use tickbus_binding::SlotKind;
-use tickbus_driver::{Exchange, SlotMap};
-use tickbus_driver_cfg::Config;
-use tickbus_image::signal::{DataType, Signal, SignalTable, Slot};
-
-use crate::value::{Value, ValueType, Version};
+use crate::value::{Value, ValueType};
 
 /// The value reference of the first slot; references below it are not signals.
 const FIRST_SLOT: u32 = 16;
@@ -29,6 +24,14 @@ pub enum Place {
     Age,
     /// The number of bus cycles that have arrived.
     Sequence,
+    /// How late the last step ended.
+    Lag,
+    /// The state of the line.
+    State,
+    /// Why the line is in its state.
+    Reason,
+    /// The clock that ticks when a new whole bus cycle has arrived.
+    Cycle,
     /// A slot of the driver: a signal, or the count of its edges.
     Slot(usize),
 }
@@ -44,6 +47,8 @@ pub enum Use {
     Input,
     /// The tool reads it after every step.
     Output,
+    /// The tool asks in the event mode whether it ticks.
+    Clock,
 }
 
 /// The value of a variable before the first step.
@@ -51,8 +56,8 @@ pub enum Use {
 pub enum Start {
     /// None: the time has its own start value.
     None,
-    /// A number.
-    Number(Value),
+    /// A number, or those of an array.
+    Numbers(Vec<Value>),
     /// A text.
     Text(String),
 }
@@ -66,6 +71,10 @@ pub struct Variable {
     pub reference: u32,
     /// The variable's type in the FMU's version.
     pub value_type: ValueType,
+    /// The enumeration that the type is, if it is one.
+    pub enumeration: Option<&'static Enumeration>,
+    /// The number of elements in each dimension; empty for a scalar.
+    pub sizes: Vec<usize>,
     /// The variable's use.
     pub usage: Use,
     /// The unit, for floating point numbers only.
@@ -76,24 +85,13 @@ pub struct Variable {
     pub description: String,
 }
 
-/// One slot, as seen by the functions of FMI.
-#[derive(Clone, Copy, Debug)]
-pub struct Cell {
-    /// The variable's type.
-    pub value_type: ValueType,
-    /// The kind of value in the slot.
-    pub kind: SlotKind,
-    /// True if the importing tool sets the slot.
-    pub is_input: bool,
-}
-
-/// All variables of a driver.cfg, in the order of the model description.
-#[derive(Clone, Debug)]
-pub struct Exposed {
-    /// The variables.
-    pub variables: Vec<Variable>,
-    /// The slots, in order.
-    pub cells: Vec<Cell>,
+/// An enumeration of FMI 3.0.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Enumeration {
+    /// The name of the type.
+    pub name: &'static str,
+    /// The names of the items; the value of each is its index here.
+    pub items: &'static [&'static str],
 }
 
 impl Place {
@@ -108,12 +106,17 @@ impl Place {
             4 => Self::Status,
             5 => Self::Age,
             6 => Self::Sequence,
+            7 => Self::Lag,
+            8 => Self::State,
+            9 => Self::Reason,
+            10 => Self::Cycle,
             FIRST_SLOT.. => Self::Slot((reference - FIRST_SLOT) as usize),
             _ => return None,
         })
     }
 
-    fn reference(self) -> u32 {
+    /// Returns the value reference of a variable with this meaning.
+    pub(super) fn reference(self) -> u32 {
         match self {
             Self::Time => 0,
             Self::Pace => 1,
@@ -122,252 +125,33 @@ impl Place {
             Self::Status => 4,
             Self::Age => 5,
             Self::Sequence => 6,
+            Self::Lag => 7,
+            Self::State => 8,
+            Self::Reason => 9,
+            Self::Cycle => 10,
             Self::Slot(slot) => FIRST_SLOT + u32::try_from(slot).unwrap_or(u32::MAX - FIRST_SLOT),
         }
     }
 }
 
-/// Returns the age of data in seconds, as a variable shows it.
+/// Returns a span in seconds, as a variable shows it.
 #[expect(clippy::cast_precision_loss, reason = "for people")]
-pub(super) fn seconds(found: &Exchange) -> f64 {
-    found.age.0 as f64 * 1e-9
+pub(super) fn seconds(span: Nanos) -> f64 {
+    span.0 as f64 / 1e9
 }
 
-/// Returns the type of a counter; FMI 2.0 has no unsigned one.
-const fn counter(version: Version) -> ValueType {
-    match version {
-        Version::Two => ValueType::Float64,
-        Version::Three => ValueType::UInt64,
-    }
-}
-
-/// Returns the type of a signal in a version: the type that can represent all its values.
-pub(super) fn type_of(signal: &Signal, version: Version) -> ValueType {
-    if signal.scale.is_some() {
-        return ValueType::Float64;
-    }
-    let (two, three) = match signal.data_type {
-        DataType::Bool => (ValueType::Boolean, ValueType::Boolean),
-        DataType::Byte | DataType::Usint => (ValueType::Int32, ValueType::UInt8),
-        DataType::Sint => (ValueType::Int32, ValueType::Int8),
-        DataType::Word | DataType::Uint => (ValueType::Int32, ValueType::UInt16),
-        DataType::Int => (ValueType::Int32, ValueType::Int16),
-        DataType::Dint => (ValueType::Int32, ValueType::Int32),
-        DataType::Dword | DataType::Udint => (ValueType::Float64, ValueType::UInt32),
-        DataType::Lint => (ValueType::Float64, ValueType::Int64),
-        DataType::Lword | DataType::Ulint => (ValueType::Float64, ValueType::UInt64),
-        DataType::Real => (ValueType::Float64, ValueType::Float32),
-        DataType::Lreal => (ValueType::Float64, ValueType::Float64),
-    };
-    match version {
-        Version::Two => two,
-        Version::Three => three,
-    }
-}
-
-/// Returns the kind of value in the slot of a signal.
-pub fn kind_of(signal: &Signal) -> SlotKind {
-    match signal.data_type {
-        _ if !signal.is_integer_slot() => SlotKind::Real,
-        DataType::Lint => SlotKind::Signed,
-        _ => SlotKind::Unsigned,
-    }
-}
-
-/// Returns the name of a variable that is not a signal: `name`, unless a signal has that name.
-fn free_name(name: &str, table: &SignalTable) -> String {
-    // Names with this prefix are reserved.
-    match table.position(name) {
-        None => name.to_owned(),
-        Some(_) => format!("bus.{name}"),
-    }
-}
-
-impl Exposed {
-    /// Returns the variables of `config` in a version.
-    pub fn of(config: &Config, version: Version) -> Self {
-        let (table, (writes, _)) = (&config.table, config.role.areas());
-        let map = SlotMap::new(table, config.role);
-        let mut variables = own_variables(config, version);
-        let mut cells = Vec::with_capacity(map.count);
-        for (slot, signal) in table.signals.iter().enumerate() {
-            let cell = Cell {
-                value_type: type_of(signal, version),
-                kind: kind_of(signal),
-                is_input: signal.area == writes,
-            };
-            let unit = signal.unit.clone().filter(|_| cell.value_type.is_float());
-            let station = &table.stations[signal.station].name;
-            let station = if station.is_empty() {
-                String::new()
-            } else {
-                format!(" of {station}")
-            };
-            variables.push(Variable {
-                name: signal.name.clone(),
-                reference: Place::Slot(slot).reference(),
-                value_type: cell.value_type,
-                usage: if cell.is_input {
-                    Use::Input
-                } else {
-                    Use::Output
-                },
-                unit,
-                start: Start::Number(Value::of(signal.fail_safe, cell.kind)),
-                description: format!("{} {}{station}", signal.address(), signal.data_type),
-            });
-            cells.push(cell);
+impl Variable {
+    /// Returns the name of the variable's element in a model description of FMI 3.0, which is that of its type.
+    pub const fn element(&self) -> &'static str {
+        match (self.usage, self.enumeration) {
+            (Use::Clock, _) => "Clock",
+            (_, Some(_)) => "Enumeration",
+            _ => self.value_type.name(),
         }
-        let edges = Cell {
-            value_type: match version {
-                Version::Two => ValueType::Int32,
-                Version::Three => ValueType::UInt32,
-            },
-            kind: SlotKind::Real,
-            is_input: false,
-        };
-        for (signal, slot) in table.signals.iter().zip(&map.edges) {
-            let Some(slot) = slot else { continue };
-            debug_assert_eq!(
-                *slot,
-                cells.len(),
-                "edges follow in the order of the signals"
-            );
-            variables.push(Variable {
-                name: format!("{}.edges", signal.name),
-                reference: Place::Slot(*slot).reference(),
-                value_type: edges.value_type,
-                usage: Use::Output,
-                unit: None,
-                start: Start::Number(Value::Unsigned(0)),
-                description: format!("edges of {} since the last step", signal.address()),
-            });
-            cells.push(edges);
-        }
-        Self { variables, cells }
     }
 
-    /// Returns the variable that a value reference stands for.
-    pub fn variable(&self, reference: u32) -> Option<&Variable> {
-        self.variables
-            .iter()
-            .find(|variable| variable.reference == reference)
+    /// Returns the number of values.
+    pub fn count(&self) -> usize {
+        self.sizes.iter().product()
     }
-}
-
-/// Returns the variables that are not signals.
-fn own_variables(config: &Config, version: Version) -> Vec<Variable> {
-    let variable =
-        |name: &str, place: Place, value_type, usage, start, description: &str| Variable {
-            name: if name.starts_with("bus.") {
-                name.to_owned()
-            } else {
-                free_name(name, &config.table)
-            },
-            reference: place.reference(),
-            value_type,
-            usage,
-            unit: matches!(place, Place::Time | Place::Age).then(|| "s".to_owned()),
-            start,
-            description: description.to_owned(),
-        };
-    let number = Start::Number;
-    let real = ValueType::Float64;
-    let record = config.record.as_ref();
-    let record = record.map(|record| record.file.to_string_lossy().into_owned());
-    let mut all = Vec::new();
-    // FMI 2.0 does not need this variable, and a library used by some of its tools rejects it.
-    if version == Version::Three {
-        let time = variable(
-            "time",
-            Place::Time,
-            real,
-            Use::Independent,
-            Start::None,
-            "Simulation time",
-        );
-        all.push(time);
-    }
-    all.push(
-        variable(
-            "pace",
-            Place::Pace,
-            real,
-            Use::Parameter,
-            number(Value::Real(default_pace(config))),
-            "Seconds of simulation in one of the clock on the wall: 1 for real time, 0 for as fast as possible",
-        ),
-    );
-    if has_address(config) {
-        all.push(variable(
-            "address",
-            Place::Address,
-            ValueType::String,
-            Use::Parameter,
-            Start::Text(String::new()),
-            "Address of the line, in place of the one in driver.cfg; empty for that one",
-        ));
-    }
-    all.extend([
-        variable(
-            "record",
-            Place::Record,
-            ValueType::String,
-            Use::Parameter,
-            Start::Text(record.unwrap_or_default()),
-            "File that every step is recorded to, ending in .vcd or .csv, from the current folder on; empty for none",
-        ),
-        variable(
-            "bus.status",
-            Place::Status,
-            ValueType::Int32,
-            Use::Output,
-            number(Value::Signed(2)),
-            "0 fresh, 1 unchanged, 2 stale",
-        ),
-        variable(
-            "bus.age",
-            Place::Age,
-            real,
-            Use::Output,
-            number(Value::Real(seconds(&Exchange::NONE))),
-            "Age of the oldest station's data",
-        ),
-        variable(
-            "bus.sequence",
-            Place::Sequence,
-            counter(version),
-            Use::Output,
-            number(Value::Unsigned(0)),
-            "Bus cycles so far",
-        ),
-    ]);
-    all
-}
-
-/// Returns true if the bus has an address that can be replaced.
-fn has_address(config: &Config) -> bool {
-    // The empty text need not be a valid address.
-    config.bus.clone().deref_mut().set_address("").is_some()
-}
-
-/// Returns true if the bus runs in the steps of the simulation.
-pub fn is_stepped(config: &Config) -> bool {
-    config.bus.is_stepped()
-}
-
-/// Returns the default pace. A free-running bus is a PLC in real time: a simulation that runs faster would see only a
-/// few of its cycles.
-pub(super) fn default_pace(config: &Config) -> f64 {
-    if is_stepped(config) { 0.0 } else { 1.0 }
-}
-
-/// Returns the slots before the first step.
-pub(super) fn initial_slots(config: &Config) -> Vec<Slot> {
-    let map = SlotMap::new(&config.table, config.role);
-    let mut slots = vec![Slot::default(); map.count];
-    for (slot, signal) in slots.iter_mut().zip(&config.table.signals) {
-        *slot = signal.fail_safe;
-    }
-    slots
 }

@@ -399,6 +399,15 @@ public final class Tickbus implements AutoCloseable {
     }
 
     /**
+     * Whether the bus has ended the run on its own, as virtual time does: further ticks bring stale values.
+     *
+     * @return true from then on
+     */
+    public boolean isOver() {
+        return overNative(handle);
+    }
+
+    /**
      * The driver's id.
      *
      * @return as driver.cfg says
@@ -667,9 +676,7 @@ public final class Tickbus implements AutoCloseable {
     /** Text for {@link StatisticsText}; throws {@link FieldbusException}. */
     static native String statisticsNative(long handle);
 
-    /**
-     * Moves events into {@code into}, three longs each, and returns their number; throws {@link FieldbusException}.
-     */
+    /** Moves events into {@code into}, three longs each; returns their number. Throws {@link FieldbusException}. */
     static native int eventsNative(long handle, long[] into);
 
     /** Injects the fault that a section describes, and returns its number; throws {@link FieldbusException}. */
@@ -680,6 +687,8 @@ public final class Tickbus implements AutoCloseable {
 
     /** A line per fault, with tabs between its fields; throws {@link FieldbusException}. */
     static native String faultsNative(long handle);
+
+    static native boolean overNative(long handle);
 
     static native String pageNative(long handle);
 

@@ -107,6 +107,7 @@ class MisuseTest {
             assertStatus(Status.CLOSED, () -> Tickbus.eventsNative(handle, new long[3]));
             assertStatus(Status.CLOSED, () -> Tickbus.injectNative(handle, "kind = \"link-down\""));
             assertStatus(Status.CLOSED, () -> Tickbus.endFaultNative(handle, 1));
+            assertStatus(Status.CLOSED, () -> Tickbus.overNative(handle));
             assertStatus(Status.CLOSED, () -> Tickbus.faultsNative(handle));
             assertTrue(tenantOfTheSamePlace.exchange() >= 0);
         }

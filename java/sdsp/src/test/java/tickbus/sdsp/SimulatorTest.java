@@ -16,6 +16,7 @@ import org.junit.jupiter.api.Test;
 import org.junit.jupiter.api.Timeout;
 import org.junit.jupiter.api.io.TempDir;
 import tickbus.FieldbusException;
+import tickbus.Tickbus;
 
 /** A Java simulator that takes part in a run through the drop-in driver: one word in its driver.cfg. */
 @Tag("native")
@@ -61,7 +62,11 @@ class SimulatorTest {
     }
 
     private FieldbusDriver open(Sync sync, String type) throws IOException {
-        return new FieldbusDriver(Files.writeString(folder.resolve("driver.cfg"), """
+        return new FieldbusDriver(config(sync, type));
+    }
+
+    private Path config(Sync sync, String type) throws IOException {
+        return Files.writeString(folder.resolve("driver.cfg"), """
             [driver]
             id = 1
             name = "hoist"
@@ -78,7 +83,7 @@ class SimulatorTest {
             name = "height"
             address = "%%IW2"
             type = "%s"
-            """.formatted(sync.port(), type)));
+            """.formatted(sync.port(), type));
     }
 
     /** One run; returns its trace hash. */
@@ -118,6 +123,23 @@ class SimulatorTest {
         List<Tick> again = new ArrayList<>();
         assertEquals(hash, run(again, new Plc()));
         assertEquals(ticks, again);
+    }
+
+    @Test
+    void aSimulatorLearnsThatTheRunIsOver() throws IOException {
+        try (Sync sync = new Sync(folder, RUN)) {
+            CompletableFuture<Outcome> joined = sync.join(new Plc());
+            try (Tickbus bus = Tickbus.open(config(sync, "INT"))) {
+                long tick = 0;
+                while (!bus.isOver()) {
+                    bus.exchange(tick * 10_000_000L);
+                    tick++;
+                }
+                // The tick at the end of the last step is the one that does not take place.
+                assertEquals(STEPS + 1, tick);
+            }
+            assertEquals(STEPS, joined.join().steps());
+        }
     }
 
     @Test

@@ -3,7 +3,7 @@
  *
  * Value references: 1 n, structural; 2 u[n], inputs; 3 y[n] = gain x u; 4 gain[n]; 5 mode (hold 1, track 2); 6 clock "sample",
  * every 0.1 s; 7 the sum of u at each sample (with mode track also in between); 8 the number of samples; 9 clock "late", counted
- * down for 0.05 s from each sample; 10 its ticks; 11 clock "third", the FMU's own: with each third sample; 12 its ticks, which can be
+ * down for 0.05 s from each sample; 10 its ticks; 13 clock "asked", every 0.2 s from 0.1 s on, as it says when it is asked; 14 its ticks; 11 clock "third", the FMU's own: with each third sample; 12 its ticks, which can be
  * read at these times alone. */
 #include <stdbool.h>
 #include <stddef.h>
@@ -19,8 +19,8 @@ typedef struct {
     uint64_t n;
     double u[MOST], gain[MOST], sampled, now, next, countdown;
     int64_t mode;
-    int32_t samples, late, thirds;
-    bool sample_ticks, late_ticks, third_ticks, counts;
+    int32_t samples, late, thirds, askeds;
+    bool sample_ticks, late_ticks, third_ticks, counts, is_known;
 } It;
 
 void *fmi3InstantiateCoSimulation(const char *name, const char *token, const char *resources, bool visible, bool logging, bool events,
@@ -74,6 +74,9 @@ int fmi3SetClock(It *it, const uint32_t *clocks, size_t count, const bool *value
             it->late_ticks = true;
             it->late++;
             it->countdown = -1;
+        } else if (clocks[i] == 13) {
+            double due = 0.1 + 0.2 * it->askeds++;
+            if (it->now < due - 1e-9 || it->now > due + 1e-9) return ERROR;
         } else {
             return ERROR;
         }
@@ -98,11 +101,23 @@ int fmi3UpdateDiscreteStates(It *it, bool *again, bool *ends, bool *nominals, bo
 }
 
 int fmi3GetIntervalDecimal(It *it, const uint32_t *clocks, size_t count, double *intervals, int *qualifiers) {
-    if (it->state != EVENT || count != 1 || clocks[0] != 9) return ERROR;
+    if (it->state != EVENT || count != 1 || (clocks[0] != 9 && clocks[0] != 13)) return ERROR;
+    if (clocks[0] == 13) {
+        qualifiers[0] = it->is_known ? 1 : 2;
+        intervals[0] = 0.2;
+        it->is_known = true;
+        return 0;
+    }
     qualifiers[0] = it->counts ? 2 : it->countdown < 0 ? 0 : 1;
     intervals[0] = 0.05;
     if (it->counts) it->countdown = it->now + 0.05;
     it->counts = false;
+    return 0;
+}
+
+int fmi3GetShiftDecimal(It *it, const uint32_t *clocks, size_t count, double *shifts) {
+    if (it->state != EVENT || count != 1 || clocks[0] != 13) return ERROR;
+    shifts[0] = 0.1;
     return 0;
 }
 
@@ -155,7 +170,7 @@ int fmi3GetInt32(It *it, const uint32_t *references, size_t count, int32_t *valu
     if (count != value_count || it->state == INSTANTIATED) return ERROR;
     for (size_t i = 0; i < count; i++) {
         if (references[i] == 12 && !it->third_ticks) return ERROR;
-        values[i] = references[i] == 8 ? it->samples : references[i] == 10 ? it->late : it->thirds;
+        values[i] = references[i] == 8 ? it->samples : references[i] == 10 ? it->late : references[i] == 14 ? it->askeds : it->thirds;
     }
     return 0;
 }

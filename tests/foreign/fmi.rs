@@ -19,6 +19,7 @@ const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 
 pub(crate) const TESTS: &[(&str, Test)] = &[
     ("fmpy_validates_and_runs_both_versions", in_fmpy),
+    ("fmpy_runs_an_fmu_of_3_0_in_the_event_mode", in_events),
     ("every_misuse_of_the_functions_has_an_answer", misuse),
     ("the_fmu_manipulation_toolbox_finds_nothing", in_toolbox),
     ("vdmcheck2_finds_nothing_but_in_a_wrong_one", in_vdmcheck),
@@ -104,6 +105,11 @@ fn types() -> [&'static str; 2] {
 fn in_fmpy() -> Result<(), Absent> {
     python()?;
     types().into_iter().try_for_each(|fmu| tool(&["fmpy", fmu]))
+}
+
+fn in_events() -> Result<(), Absent> {
+    python()?;
+    tool(&["events", types()[1]])
 }
 
 fn misuse() -> Result<(), Absent> {

@@ -111,10 +111,20 @@ def fmpy(path):
             for (name, _), value in zip(some, found):
                 wanted = VALUES[name][turn]
                 assert close(value, wanted, name), (name, turn, value, wanted)
+    if not is_two:
+        # An array, set and got as a whole.
+        into, back = named["vector <in>"], named["vector <out>"]
+        slave.setInt16([into[1]], [-3, 4])
+        for _ in range(2):
+            slave.doStep(time, STEP)
+            time += STEP
+        assert slave.getInt16([back[1]], nValues=2) == [-3, 4]
+        assert slave.getInt64([named["bus.state"][1]]) == [2]
+        assert slave.getString([named["bus.reason"][1]]) == ["the hosted program is there"]
     edges = named["bool <out>.edges"]
     assert get(edges[0], [edges[1]])[0] in (0, 1)
     status = named["bus.status"]
-    assert get(status[0], [status[1]]) == [0]
+    assert (slave.getInteger if is_two else slave.getInt64)([status[1]]) == [0]
     assert any("is running" in text for _, category, text in lines if category == "logEvents"), lines
     # Time cannot go back: expect an error, and a sentence in the tool's log.
     lines.clear()
@@ -140,6 +150,63 @@ def fmpy(path):
     result = fmpy.simulate_fmu(folder, stop_time=0.5, output_interval=STEP, output=["bus.status"], model_description=description)
     assert result["bus.status"][-1] in (0, 1), result[-1]
     return f"version={description.fmiVersion} variables={len(named)}"
+
+
+def events(path):
+    """An FMU of 3.0 in the event mode: a step ends with the PLC's scan, if the tool allows that, and the clock ticks."""
+    import fmpy
+    from fmpy import extract, read_model_description
+    from fmpy.fmi3 import FMU3Slave
+
+    description = read_model_description(path)
+    named = {one.name: one for one in description.modelVariables}
+    items = [item.name for item in named["bus.status"].declaredType.items]
+    assert items == ["fresh", "unchanged", "stale"], items
+    assert named["vector <out>"].shape == (2,), named["vector <out>"]
+    assert description.coSimulation.hasEventMode and description.coSimulation.mightReturnEarlyFromDoStep
+
+    def times(**options):
+        result = fmpy.simulate_fmu(path, stop_time=0.2, output_interval=0.05, output=["vector <out>", "bus.status"], use_event_mode=True, **options)
+        assert result["vector <out>"].shape[1] == 2
+        return sorted({round(time, 9) for time in result["time"]})
+
+    regular = [0.0, 0.05, 0.1, 0.15, 0.2]
+    assert times() == regular
+    # The PLC scans every 10 ms from the end of the first step on.
+    assert times(early_return_allowed=True) == [0.0, *(round(0.05 + 0.01 * at, 9) for at in range(16))]
+    slave = FMU3Slave(
+        guid=description.guid, modelIdentifier=description.coSimulation.modelIdentifier, unzipDirectory=extract(path), instanceName="events"
+    )
+    slave.instantiate(eventModeUsed=True, earlyReturnAllowed=True)
+    slave.enterInitializationMode(startTime=0.0, stopTime=0.2)
+    slave.exitInitializationMode()
+    clock = [named["bus.cycle"].valueReference]
+    ticks, time = 0, 0.0
+    ticked = slave.getClock(clock)[0]
+    while time < 0.2 - 1e-9:
+        again, ends, _, _, has_next, following = slave.updateDiscreteStates()
+        assert not again and not ends
+        assert slave.getClock(clock) == [False]
+        assert not has_next or time < following <= time + STEP + 1e-9, (time, following)
+        slave.enterStepMode()
+        event, ends, _, reached = slave.doStep(time, min(0.05, 0.2 - time))
+        assert not ends and reached > time, (time, reached)
+        time = reached
+        slave.enterEventMode()
+        ticked = slave.getClock(clock)[0]
+        assert ticked == event
+        ticks += ticked
+    assert ticks == 16, ticks
+    slave.enterStepMode()
+    for length in (STEP, 1.0):
+        try:
+            slave.doStep(time, length)
+        except Exception:  # noqa: BLE001 - FMPy's own
+            continue
+        raise AssertionError("a step beyond the stop time was done")
+    slave.terminate()
+    slave.freeInstance()
+    return "ticks=16"
 
 
 def tank(path):
@@ -249,6 +316,32 @@ def misuse(path):
         assert step(instance, double(0), double(STEP), 1, None, None, None, None) == 3, "before the initialisation"
     lacking = library.fmi2GetFMUstate if is_two else library.fmi3GetFMUState
     assert lacking(handle, None) == 3
+    if not is_two:
+        # Without the event mode, and before the initialisation.
+        flag = (ctypes.c_bool * 1)()
+        for call in (library.fmi3EnterEventMode, library.fmi3EnterStepMode, library.fmi3ExitInitializationMode, library.fmi3Terminate):
+            assert call(handle) == 3 and call(none) == 3
+        assert library.fmi3UpdateDiscreteStates(handle, None, None, None, None, None, None) == 3
+        assert library.fmi3GetClock(handle, reference, size(1), flag) == 3
+        assert library.fmi3GetClock(handle, None, size(1), None) == 3
+        enter = library.fmi3EnterInitializationMode
+        never = double(float("nan"))
+        assert enter(handle, False, double(0), double(0), True, double(-1)) == 3
+        assert enter(handle, False, double(0), never, False, double(0)) == 3
+        assert enter(handle, True, never, double(0), True, double(1)) == 0, "a tolerance has no effect"
+        assert enter(handle, False, double(0), double(0), False, double(0)) == 3
+        assert library.fmi3ExitInitializationMode(handle) == 0
+        assert library.fmi3UpdateDiscreteStates(handle, None, None, None, None, None, None) == 3
+        # A whole array has two values.
+        vector = (ctypes.c_uint32 * 1)(next(one.valueReference for one in description.modelVariables if one.name == "vector <in>"))
+        shorts = (ctypes.c_int16 * 3)()
+        for count in (0, 1, 2, 3):
+            assert library.fmi3SetInt16(handle, vector, size(1), shorts, size(count)) == (0 if count == 2 else 3), count
+            assert library.fmi3GetInt16(handle, vector, size(1), shorts, size(count)) == (0 if count == 2 else 3), count
+        assert step(handle, double(0), double(STEP), False, None, None, None, None) == 0
+        assert step(handle, double(STEP), double(1), False, None, None, None, None) == 3, "beyond the stop time"
+        assert library.fmi3Terminate(handle) == 0
+        assert library.fmi3Terminate(handle) == 3
     (library.fmi2FreeInstance if is_two else library.fmi3FreeInstance)(handle)
     (library.fmi2FreeInstance if is_two else library.fmi3FreeInstance)(none)
     return "lives"
@@ -326,7 +419,7 @@ def rig_in_c(library, config, record):
     return "steps=2000"
 
 
-TOOLS = [fmpy, tank, toolbox, cosim, pathsim, misuse, rig, rig_in_c]
+TOOLS = [fmpy, events, tank, toolbox, cosim, pathsim, misuse, rig, rig_in_c]
 
 if __name__ == "__main__":
     tool, *arguments = sys.argv[1:]

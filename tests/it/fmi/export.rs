@@ -55,9 +55,13 @@ fn model_descriptions_are_their_golden_files() {
         assert!(made == expected, "{} differs:\n{made}", golden.display());
         // Read back by the reader for foreign FMUs: names and references are complete.
         let model = Model::parse("made", &made).unwrap_or_else(|mistakes| panic!("{mistakes}"));
-        let references: BTreeSet<u32> = model.variables.iter().map(|one| one.reference).collect();
+        // The elements of an array have the reference of the array.
+        let variables = model.variables.iter();
+        let firsts = variables.filter(|one| !one.is_element() || one.name.ends_with("[1]"));
+        let listed: Vec<u32> = firsts.map(|one| one.reference).collect();
+        let references: BTreeSet<u32> = listed.iter().copied().collect();
         let names: BTreeSet<&str> = model.variables.iter().map(|one| &*one.name).collect();
-        assert_eq!(references.len(), model.variables.len());
+        assert_eq!(references.len(), listed.len());
         assert_eq!(names.len(), model.variables.len());
     }
 }

@@ -6,6 +6,6 @@ mod export;
 mod faults;
 mod fit;
 mod fixture;
-mod run;
+pub(crate) mod run;
 mod three;
 mod wrong;

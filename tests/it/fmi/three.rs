@@ -18,7 +18,10 @@ const VARIABLES: &str = "
   <Clock name=\"late\" valueReference=\"9\" causality=\"input\" intervalVariability=\"countdown\"/>
   <Int32 name=\"lates\" valueReference=\"10\" causality=\"output\"/>
   <Clock name=\"third\" valueReference=\"11\" causality=\"output\" intervalVariability=\"triggered\"/>
-  <Int32 name=\"thirds\" valueReference=\"12\" causality=\"output\" clocks=\"11\"/>";
+  <Int32 name=\"thirds\" valueReference=\"12\" causality=\"output\" clocks=\"11\"/>
+  <Clock name=\"asked\" valueReference=\"13\" causality=\"input\" intervalVariability=\"tunable\"/>
+  <Int32 name=\"askeds\" valueReference=\"14\" causality=\"output\"/>
+  <Binary name=\"blob\" valueReference=\"15\" causality=\"input\"/>";
 
 const CONFIG: &str = "[driver]\nid = 1\nname = \"It\"\n[fieldbus]\nkind = \"loopback\"\nprogram = \"mirror\"\n\
     mode = \"stepped\"\nscan = \"10ms\"\n\
@@ -28,6 +31,7 @@ const CONFIG: &str = "[driver]\nid = 1\nname = \"It\"\n[fieldbus]\nkind = \"loop
     [[signal]]\nname = \"samples\"\naddress = \"%ID12\"\ntype = \"DINT\"\n\
     [[signal]]\nname = \"lates\"\naddress = \"%ID16\"\ntype = \"DINT\"\n\
     [[signal]]\nname = \"thirds\"\naddress = \"%ID20\"\ntype = \"DINT\"\n\
+    [[signal]]\nname = \"askeds\"\naddress = \"%ID24\"\ntype = \"DINT\"\n\
     [[signal]]\nname = \"u[1]\"\naddress = \"%QD0\"\ntype = \"REAL\"\n";
 
 const MAP: &str =
@@ -83,7 +87,11 @@ fn arrays_sizes_enumerations_and_clocks_run_in_both_ways() {
     for more in [&[][..], &["--isolated"]] {
         let (last, told) = run(MAP, more);
         // y[2] is 2 x u[2], which keeps its start value 2; the mirror sends it to u[1]. u[3] is 3.
-        assert_eq!(last, ["4", "4", "9", "10", "10", "3", "4"], "{told}");
+        assert_eq!(last, ["4", "4", "9", "10", "10", "3", "5", "4"], "{told}");
+        assert!(
+            told.contains("input \"blob\" of the FMU keeps its start value"),
+            "{told}"
+        );
         assert!(
             told.contains("input \"u[3]\" of the FMU keeps its start value"),
             "{told}"

@@ -10,15 +10,15 @@ mod sources;
 
 pub use settings::{HelicsMapping, HelicsSettings};
 
-use std::path::PathBuf;
-use std::sync::Arc;
+use std::path::Path;
 
 use tickbus_base::Mistake;
-use tickbus_base::time::{Clock, Nanos, Stop};
+use tickbus_base::time::Nanos;
 use tickbus_bus_sdsp::connect;
 use tickbus_virtual_time::{Ended, Meeting, Outcome, Step};
 
 use crate::member::{Federation, ended, run};
+use crate::opened::{EngineLibrary, Opened};
 use crate::value::{Kind, Value};
 use crate::watch::Watch;
 use library::{Federate, Library, Publication, Subscription};
@@ -27,23 +27,17 @@ use sources::Sources;
 /// A second, in nanoseconds.
 const SECOND: f64 = 1e9;
 
-/// How a federate takes part.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct HelicsOptions {
-    /// The library; `None`: the one in the environment variable `HELICS_LIBRARY`, of the Python package, or of the system.
-    pub library: Option<PathBuf>,
-    /// How long the broker and the server may take to appear, and the federation to grant a time.
-    pub timeout: Nanos,
-}
-
 /// A federation of HELICS as a client of a run.
-#[derive(Debug)]
-pub struct Helics {
-    mapping: HelicsMapping,
-    options: HelicsOptions,
-    library: Library,
-    clock: Arc<dyn Clock>,
-    stop: Stop,
+pub type Helics = Opened<HelicsSettings, Library>;
+
+impl EngineLibrary for Library {
+    fn find(named: Option<&Path>) -> Result<Self, Mistake> {
+        find::load(named)
+    }
+
+    fn version(&self) -> String {
+        Self::version(*self)
+    }
 }
 
 /// The federate in its federation.
@@ -58,31 +52,6 @@ struct Joined<'h> {
 }
 
 impl Helics {
-    /// Loads the library. When `stop` is stopped, the federate leaves federation and run.
-    ///
-    /// # Errors
-    ///
-    /// The library is missing, or is not one of HELICS 3.
-    pub fn open(
-        mapping: HelicsMapping,
-        options: HelicsOptions,
-        clock: Arc<dyn Clock>,
-        stop: &Stop,
-    ) -> Result<Self, Mistake> {
-        Ok(Self {
-            library: find::load(options.library.as_deref())?,
-            mapping,
-            options,
-            clock,
-            stop: stop.clone(),
-        })
-    }
-
-    /// The version of the library.
-    pub fn version(&self) -> String {
-        self.library.version()
-    }
-
     /// Joins the federation, waits until it is complete, and takes part in the run of the server at `meeting` until the run
     /// ends. `news` gets a line for people about each stage.
     ///

@@ -6,11 +6,13 @@ mod find;
 mod helics;
 mod mapping;
 mod member;
+mod opened;
 mod silkit;
 mod text;
 mod value;
 mod watch;
 
-pub use helics::{Helics, HelicsMapping, HelicsOptions, HelicsSettings};
+pub use helics::{Helics, HelicsMapping, HelicsSettings};
 pub use mapping::{Engine, Mapping, Publish, Subscribe};
-pub use silkit::{Label, SilKit, SilKitMapping, SilKitOptions, SilKitSettings, Topic};
+pub use opened::{EngineLibrary, Opened, Options};
+pub use silkit::{Label, SilKit, SilKitMapping, SilKitSettings, Topic};

@@ -16,7 +16,7 @@ pub(crate) const LONGEST: usize = 255;
 /// The part of a mapping that differs between the engines.
 pub trait Engine: Sized {
     /// The place of a value in the federation.
-    type Key;
+    type Key: std::fmt::Debug;
     /// The name of the file's table.
     const TABLE: &'static str;
     /// The key of the name in the federation.

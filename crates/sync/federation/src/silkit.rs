@@ -11,18 +11,19 @@ mod settings;
 
 pub use settings::{Label, SilKitMapping, SilKitSettings, Topic};
 
-use std::path::PathBuf;
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread::Builder;
 use std::time::Duration;
 
 use tickbus_base::Mistake;
-use tickbus_base::time::{Clock, Nanos, Stop};
+use tickbus_base::time::Nanos;
 use tickbus_bus_sdsp::connect;
 use tickbus_virtual_time::{Ended, Meeting, Outcome, Step};
 
 use crate::member::{Federation, ended, run};
+use crate::opened::{EngineLibrary, Opened};
 use inbox::{Inbox, Slot};
 use library::{Library, Member, Participant, Publisher};
 
@@ -32,23 +33,17 @@ const PAUSE: Nanos = Nanos::from_millis(200);
 /// How often a blocked thread looks whether it was stopped.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// How a participant takes part.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct SilKitOptions {
-    /// The library; `None`: the one in the environment variable `SILKIT_LIBRARY`, or the system's.
-    pub library: Option<PathBuf>,
-    /// How long the registry and the server may take to appear, and the simulation to come to the next step.
-    pub timeout: Nanos,
-}
-
 /// A simulation of SIL Kit as a client of a run.
-#[derive(Debug)]
-pub struct SilKit {
-    mapping: SilKitMapping,
-    options: SilKitOptions,
-    library: Library,
-    clock: Arc<dyn Clock>,
-    stop: Stop,
+pub type SilKit = Opened<SilKitSettings, Library>;
+
+impl EngineLibrary for Library {
+    fn find(named: Option<&Path>) -> Result<Self, Mistake> {
+        find::load(named)
+    }
+
+    fn version(&self) -> String {
+        Self::version(*self)
+    }
 }
 
 /// The participant in its simulation.
@@ -65,31 +60,6 @@ struct Joined<'s> {
 }
 
 impl SilKit {
-    /// Loads the library. When `stop` is stopped, the participant leaves simulation and run.
-    ///
-    /// # Errors
-    ///
-    /// The library is missing, or is not one of SIL Kit 5.
-    pub fn open(
-        mapping: SilKitMapping,
-        options: SilKitOptions,
-        clock: Arc<dyn Clock>,
-        stop: &Stop,
-    ) -> Result<Self, Mistake> {
-        Ok(Self {
-            library: find::load(options.library.as_deref())?,
-            mapping,
-            options,
-            clock,
-            stop: stop.clone(),
-        })
-    }
-
-    /// The version of the library.
-    pub fn version(&self) -> String {
-        self.library.version()
-    }
-
     /// Joins the simulation, waits until all its participants have connected, and takes part in the run of the server at
     /// `meeting` until the run ends. `news` gets a line for people about each stage.
     ///

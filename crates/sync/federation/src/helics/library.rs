@@ -75,7 +75,7 @@ const ENDED: c_int = -101;
 
 /// The loaded library. It is never unloaded: its threads may outlive the federate.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Library(&'static Functions);
+pub struct Library(&'static Functions);
 
 /// A publication of our federate.
 #[derive(Debug)]

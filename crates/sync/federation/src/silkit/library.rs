@@ -128,7 +128,7 @@ struct Status {
 
 /// The loaded library. It is never unloaded: its threads may outlive the participant.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Library(&'static Functions);
+pub struct Library(&'static Functions);
 
 /// A publisher of our participant.
 #[derive(Debug)]

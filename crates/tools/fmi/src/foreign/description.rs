@@ -192,10 +192,11 @@ fn clocks_of<'a, 'i: 'a>(nodes: impl Iterator<Item = Node<'a, 'i>>) -> (Vec<Cloc
         };
         let interval = seconds("intervalDecimal", "intervalCounter");
         let interval = interval.filter(|interval| interval.is_finite() && *interval > 0.0);
+        let shift = seconds("shiftDecimal", "shiftCounter");
         let timing = match (node.attribute("intervalVariability"), interval) {
             (Some("constant" | "fixed"), Some(interval)) => Timing::Periodic {
                 interval,
-                shift: seconds("shiftDecimal", "shiftCounter").unwrap_or(0.0),
+                shift: shift.unwrap_or(0.0),
             },
             (Some("countdown"), _) => Timing::Countdown,
             (Some("triggered"), _) => {
@@ -204,7 +205,7 @@ fn clocks_of<'a, 'i: 'a>(nodes: impl Iterator<Item = Node<'a, 'i>>) -> (Vec<Cloc
                 }
                 continue;
             }
-            _ => Timing::Asked,
+            _ => Timing::Asked { shift },
         };
         match node.attribute("causality") {
             Some("input") => clocks.push(Clock { reference, timing }),

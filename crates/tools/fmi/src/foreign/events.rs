@@ -116,7 +116,7 @@ impl Events {
             interval: None,
             next: match clock.timing {
                 Timing::Periodic { shift, .. } => Some(start + shift),
-                Timing::Asked | Timing::Countdown => None,
+                Timing::Asked { .. } | Timing::Countdown => None,
             },
         });
         Self {
@@ -156,7 +156,7 @@ impl Events {
                 Timing::Periodic { interval, shift } => {
                     Some(self.start + shift + one.ticks * interval)
                 }
-                Timing::Asked => one.interval.map(|interval| now + interval),
+                Timing::Asked { .. } => one.interval.map(|interval| now + interval),
                 Timing::Countdown => None,
             };
         }
@@ -208,10 +208,10 @@ impl Events {
     /// Asks for the intervals of the clocks that do not state them in the model description.
     fn ask(&mut self, instance: &mut Instance, now: f64, due: &[u32]) -> Result<(), Refused> {
         for one in &mut self.clocks {
-            let is_countdown = match one.clock.timing {
+            let (is_countdown, stated) = match one.clock.timing {
                 Timing::Periodic { .. } => continue,
-                Timing::Asked => false,
-                Timing::Countdown => true,
+                Timing::Asked { shift } => (false, shift),
+                Timing::Countdown => (true, None),
             };
             // The interval of a ticking clock may be another one from each tick on.
             let is_wanted =
@@ -225,8 +225,22 @@ impl Events {
                 if !is_countdown && seconds <= SAME {
                     return Err((Status::Error, "a clock with an interval of 0"));
                 }
+                let is_first = one.interval.is_none() && !is_countdown;
                 one.interval = Some(seconds);
-                one.next = Some(now + seconds);
+                one.next = Some(if is_first {
+                    let shift = match stated {
+                        Some(shift) => shift,
+                        None => {
+                            let (status, shift) = instance.shift(one.clock.reference);
+                            good(status, "asking for the shift of a clock")?;
+                            shift
+                        }
+                    };
+                    // A clock that learns its interval later has missed its shift.
+                    (self.start + shift).max(now)
+                } else {
+                    now + seconds
+                });
             }
         }
         Ok(())

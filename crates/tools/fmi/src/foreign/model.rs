@@ -134,8 +134,9 @@ pub(super) struct Array {
 pub(super) enum Timing {
     /// First after `shift`, then every `interval`, in seconds.
     Periodic { interval: f64, shift: f64 },
-    /// The FMU is asked for the interval: at the beginning, and after each of its events.
-    Asked,
+    /// First after `shift`, for which the FMU is asked if its model description does not state it; then after the
+    /// interval, for which the FMU is asked at the beginning, and after each of its events.
+    Asked { shift: Option<f64> },
     /// Once after each interval that the FMU states.
     Countdown,
 }

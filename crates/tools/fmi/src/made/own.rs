@@ -12,13 +12,13 @@ use crate::value::{Value, ValueType, Version};
 
 /// The type of `bus.status`.
 static STATUS: Enumeration = Enumeration {
-    name: "Status",
+    name: "bus.Status",
     items: &["fresh", "unchanged", "stale"],
 };
 
 /// The type of `bus.state`.
 static STATE: Enumeration = Enumeration {
-    name: "State",
+    name: "bus.State",
     items: &STATES,
 };
 

@@ -19,6 +19,7 @@ super::functions::functions! { EventFunctions, "fmi3":
     set_clock: unsafe extern "C" fn(Handle, *const u32, usize, *const bool) -> c_int = "SetClock";
     get_clock: unsafe extern "C" fn(Handle, *const u32, usize, *mut u8) -> c_int = "GetClock";
     interval: unsafe extern "C" fn(Handle, *const u32, usize, *mut f64, *mut c_int) -> c_int = "GetIntervalDecimal";
+    shift: unsafe extern "C" fn(Handle, *const u32, usize, *mut f64) -> c_int = "GetShiftDecimal";
 }
 
 /// The result of an iteration of the event mode.
@@ -143,5 +144,15 @@ impl Instance {
             _ => Interval::Unknown,
         };
         (self.noted(status), interval)
+    }
+
+    /// Asks for the shift of a clock, in seconds; 0 for one that is no time.
+    pub(in crate::foreign) fn shift(&mut self, clock: u32) -> (Status, f64) {
+        let shift = self.events().shift;
+        let mut seconds = 0.0_f64;
+        // SAFETY: as above.
+        let status = unsafe { shift(self.handle, &raw const clock, 1, &raw mut seconds) };
+        let is_time = seconds.is_finite() && seconds >= 0.0;
+        (self.noted(status), if is_time { seconds } else { 0.0 })
     }
 }

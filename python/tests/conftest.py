@@ -2,6 +2,7 @@
 
 import os
 import re
+import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -87,6 +88,34 @@ def root(*parts: str) -> Path:
 
 
 @pytest.fixture
+def virtual_run(tmp_path: Path) -> Iterator[Callable[[int], Callable[..., Path]]]:
+    """Starts a run of 200 ms on virtual time for a number of clients; makes a client's driver.cfg from its id and role."""
+    command = root("target", "release", "tickbus")
+    if not command.exists():
+        pytest.skip("there is no target/release/tickbus")
+    servers = []
+
+    def start(clients: int) -> Callable[..., Path]:
+        sync = tmp_path / "sync.toml"
+        sync.write_text(f'[sync]\nstep = "2ms"\nclients = {clients}\nlisten = "127.0.0.1:0"\nuntil = "200ms"\n')
+        servers.append(subprocess.Popen([command, "sync", sync], stdout=subprocess.PIPE, text=True))
+        address = servers[-1].stdout.readline().split("listening on ")[1].strip()
+
+        def cfg(number: int, role: str, signals: str = SIGNALS) -> Path:
+            file = tmp_path / f"{role}.cfg"
+            head = f'[driver]\nid = {number}\nname = "{role}"\n[fieldbus]\nkind = "sdsp"\naddress = "{address}"\nrole = "{role}"\n'
+            file.write_text(head + signals)
+            return file
+
+        return cfg
+
+    yield start
+    for server in servers:
+        server.terminate()
+        server.communicate(timeout=30)
+
+
+@pytest.fixture
 def line_cfg(tmp_path: Path) -> Path:
     """A driver.cfg whose PLC copies every %I to the %Q of the same address."""
     file = tmp_path / "line.cfg"
@@ -116,8 +145,6 @@ def no_unexpected_warning(capfd: pytest.CaptureFixture[str]) -> Iterator[None]:
 @pytest.fixture
 def python(tmp_path: Path) -> Callable[..., Any]:
     """Runs a program in a separate Python process, which must not crash."""
-    import subprocess
-
     def run(program: str, *arguments: Any) -> subprocess.CompletedProcess[str]:
         command = [sys.executable, "-X", "faulthandler", "-c", program, *map(str, arguments)]
         return subprocess.run(

@@ -126,26 +126,22 @@ def test_a_thread_may_close_while_another_one_ticks(line_cfg):
     assert seen == [Status.CLOSED]
 
 
-def test_the_lock_is_released_while_a_stepped_bus_waits(line_cfg, tmp_path):
+def test_a_loop_ends_when_the_run_on_virtual_time_is_over(virtual_run):
+    config = virtual_run(1)(1, "device", '[[signal]]\nname = "Start"\naddress = "%IX0.0"\n')
+    with tickbus.open(config) as driver:
+        turns = 0
+        for turn in driver.every("1ms"):
+            assert turn.lag >= 0 and not driver.is_over
+            driver.exchange(ns=turns * 2_000_000)
+            turns += 1
+        assert driver.is_over
+    # A step of 2 ms for each turn, in 200 ms; the turn at the end of the last one does not take place.
+    assert turns == 101
+
+
+def test_the_lock_is_released_while_a_stepped_bus_waits(virtual_run):
     """In lock-step over virtual time, a tick waits for the other participant, which is a thread of this interpreter."""
-    import subprocess
-
-    from conftest import SIGNALS, root
-
-    command = root("target", "release", "tickbus")
-    if not command.exists():
-        pytest.skip("there is no target/release/tickbus")
-    sync = tmp_path / "sync.toml"
-    sync.write_text('[sync]\nstep = "2ms"\nclients = 2\nlisten = "127.0.0.1:0"\nuntil = "200ms"\n')
-    server = subprocess.Popen([command, "sync", sync], stdout=subprocess.PIPE, text=True)
-    line = server.stdout.readline()
-    address = line.split("listening on ")[1].strip()
-
-    def cfg(number, role):
-        file = tmp_path / f"{role}.cfg"
-        head = f'[driver]\nid = {number}\nname = "{role}"\n[fieldbus]\nkind = "sdsp"\naddress = "{address}"\nrole = "{role}"\n'
-        file.write_text(head + SIGNALS)
-        return file
+    cfg = virtual_run(2)
 
     def take_part(file, name, ticks):
         with tickbus.open(file) as driver:
@@ -166,8 +162,6 @@ def test_the_lock_is_released_while_a_stepped_bus_waits(line_cfg, tmp_path):
     for thread in (machine, plc):
         thread.join(30)
         assert not thread.is_alive()
-    server.terminate()
-    server.communicate(timeout=30)
     assert seen[0] and seen[1]
 
 

@@ -548,10 +548,12 @@ struct Turn {
 unsafe extern "C" fn tb_every(period: i64, turn: *mut Turn) -> i32 {
     answer(|| {
         // SAFETY: promised by the caller.
-        let turn = unsafe { turn.as_mut() }.filter(|_| period > 0).ok_or_else(|| {
-            let text = "turn is NULL, or period is not above 0";
-            Refusal::new(Code::BadArgument, text)
-        })?;
+        let turn = unsafe { turn.as_mut() }
+            .filter(|_| period > 0)
+            .ok_or_else(|| {
+                let text = "turn is NULL, or period is not above 0";
+                Refusal::new(Code::BadArgument, text)
+            })?;
         let clock = Monotonic::shared();
         if turn.begun == 0 {
             // The clock begins at 0, so a turn could begin then.
@@ -572,7 +574,11 @@ unsafe extern "C" fn tb_every(period: i64, turn: *mut Turn) -> i32 {
 
 #[unsafe(no_mangle)]
 extern "C" fn tb_is_over(driver: i64) -> i32 {
-    answer(|| Ok(DRIVERS.visit(driver, |opened| opened.device.is_over())?.into()))
+    answer(|| {
+        Ok(DRIVERS
+            .visit(driver, |opened| opened.device.is_over())?
+            .into())
+    })
 }
 
 #[unsafe(no_mangle)]

@@ -7,7 +7,9 @@ use super::{report, say, stop_on_ctrl_c};
 use crate::cli::Outcome;
 use crate::cli::host::span;
 use tickbus_base::time::{Monotonic, Nanos};
-use tickbus_federation::{self as federation, EngineLibrary, Helics, Mapping, Opened, Options, SilKit};
+use tickbus_federation::{
+    self as federation, EngineLibrary, Helics, Mapping, Opened, Options, SilKit,
+};
 use tickbus_virtual_time::{self as virtual_time, Ended, Meeting};
 
 /// Let a federation of another engine take part in a run.

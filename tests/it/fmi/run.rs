@@ -401,11 +401,7 @@ fn a_test_file_names_an_fmu_that_is_not_right() {
 
 /// A server of virtual time with one client and this many steps of 10 ms, and a driver.cfg next to the FMU that takes
 /// part.
-pub(crate) fn with_server<R>(
-    folder: &Path,
-    steps: u64,
-    work: impl FnOnce() -> R,
-) -> (R, Outcome) {
+pub(crate) fn with_server<R>(folder: &Path, steps: u64, work: impl FnOnce() -> R) -> (R, Outcome) {
     let listener = tcp::Listener::bind(&Address::local(0)).expect("a free port");
     let bus = format!("kind = \"sdsp\"\naddress = \"{}\"\n", listener.address());
     let config = CONFIG.replace(

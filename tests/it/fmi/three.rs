@@ -4,7 +4,7 @@ use std::fs;
 
 use tempfile::TempDir;
 
-use crate::fmi::fixture::{Entry, archive, err, out, sampling, tickbus};
+use crate::fmi::fixture::{Entry, archive, err, library, out, sampling, tickbus};
 
 const VARIABLES: &str = "
   <UInt64 name=\"n\" valueReference=\"1\" causality=\"structuralParameter\" variability=\"fixed\" start=\"2\"/>
@@ -97,6 +97,57 @@ fn arrays_sizes_enumerations_and_clocks_run_in_both_ways() {
             "{told}"
         );
         assert!(told.contains("run: ok ticks=25 time=1s"), "{told}");
+    }
+}
+
+/// An exported FMU behind `tickbus run`: its clock and its event mode are used, and its inputs are set as whole arrays.
+#[test]
+fn an_exported_fmu_with_arrays_and_a_clock_runs_as_a_machine() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let head = |name: &str| {
+        format!(
+            "[driver]\nid = 1\nname = \"{name}\"\n[fieldbus]\nkind = \"loopback\"\nprogram = \"mirror\"\n\
+             mode = \"stepped\"\nscan = \"10ms\"\n"
+        )
+    };
+    let signal = |name: &str, address: &str, more: &str| {
+        format!("[[signal]]\nname = \"{name}\"\naddress = \"{address}\"\ntype = \"INT\"\n{more}")
+    };
+    let inner = [
+        head("Inner"),
+        signal("x[1]", "%IW0", "fail_safe = 3\n"),
+        signal("x[2]", "%IW2", "fail_safe = 4\n"),
+        signal("y[1]", "%QW0", ""),
+        signal("y[2]", "%QW2", ""),
+    ];
+    // The outer PLC sends y[1] to x[2]; x[1] keeps its start value.
+    let outer = [
+        head("Outer"),
+        signal("y[1]", "%IW2", ""),
+        signal("y[2]", "%IW4", ""),
+        signal("x[2]", "%QW2", ""),
+    ];
+    let write =
+        |name: &str, text: String| fs::write(folder.path().join(name), text).expect("a file");
+    write("inner.cfg", inner.concat());
+    write("outer.cfg", outer.concat());
+    let library = library().to_str().expect("UTF-8");
+    let made = ["export", "inner.cfg", "--for", "fmi3", "--library", library];
+    let made = tickbus(folder.path(), &made);
+    assert_eq!(made.status.code(), Some(0), "{}", err(&made));
+    for more in [&[][..], &["--isolated"]] {
+        let run = ["run", "inner-fmi3.fmu", "--config", "outer.cfg"];
+        let options = ["--duration", "1s", "--step", "20ms", "--record", "it.csv"];
+        let ran = tickbus(folder.path(), &[&run[..], &options, more].concat());
+        let told = format!("{}{}", out(&ran), err(&ran));
+        assert!(told.contains("run: ok ticks=50 time=1s stale=0"), "{told}");
+        assert!(
+            told.contains("input \"x[1]\" of the FMU keeps its start value"),
+            "{told}"
+        );
+        let record = fs::read_to_string(folder.path().join("it.csv")).expect("a recording");
+        let last = record.lines().last().expect("a line");
+        assert!(last.ends_with(",3,3,3"), "{record}");
     }
 }
 

@@ -228,13 +228,12 @@ impl Events {
                 let is_first = one.interval.is_none() && !is_countdown;
                 one.interval = Some(seconds);
                 one.next = Some(if is_first {
-                    let shift = match stated {
-                        Some(shift) => shift,
-                        None => {
-                            let (status, shift) = instance.shift(one.clock.reference);
-                            good(status, "asking for the shift of a clock")?;
-                            shift
-                        }
+                    let shift = if let Some(shift) = stated {
+                        shift
+                    } else {
+                        let (status, shift) = instance.shift(one.clock.reference);
+                        good(status, "asking for the shift of a clock")?;
+                        shift
                     };
                     // A clock that learns its interval later has missed its shift.
                     (self.start + shift).max(now)

@@ -214,9 +214,10 @@ fn variable_of_three(text: &mut String, variable: &Variable) {
         let _ = write!(text, " declaredType=\"{}\"", declared.name);
     }
     let start = start(variable);
-    let mut inner: String = (variable.sizes.iter())
-        .map(|size| format!("<Dimension start=\"{size}\"/>"))
-        .collect();
+    let mut inner = String::new();
+    for size in &variable.sizes {
+        let _ = write!(inner, "<Dimension start=\"{size}\"/>");
+    }
     if variable.value_type == ValueType::String
         && let Some(start) = &start
     {

@@ -79,9 +79,8 @@ fn own(
 pub(super) fn own_variables(config: &Config, version: Version) -> Vec<Variable> {
     use ValueType::{Boolean, Float64, Int32, Int64, String as Text};
 
-    let own = |what, usage, start, description: &str| {
-        own(&config.table, what, usage, start, description)
-    };
+    let own =
+        |what, usage, start, description: &str| own(&config.table, what, usage, start, description);
     let number = |value| Start::Numbers(vec![value]);
     let record = config.record.as_ref();
     let record = record.map(|record| record.file.to_string_lossy().into_owned());
@@ -185,4 +184,3 @@ pub fn is_stepped(config: &Config) -> bool {
 pub(super) fn default_pace(config: &Config) -> f64 {
     if is_stepped(config) { 0.0 } else { 1.0 }
 }
-

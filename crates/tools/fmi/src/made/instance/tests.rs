@@ -123,7 +123,10 @@ fn calls_in_a_wrong_order_are_refused_and_change_nothing() {
         refused(step(&mut it), exit);
         refused(it.terminate(), exit);
         assert_eq!(it.open(), Ok(()));
-        refused(it.open(), "leaving the initialisation mode in the step mode");
+        refused(
+            it.open(),
+            "leaving the initialisation mode in the step mode",
+        );
         refused(it.enter_initialization(), "in the step mode");
         refused(it.enter_events(), "the event mode was not asked for");
         refused(update(&mut it), "updating discrete states in the step mode");
@@ -191,7 +194,7 @@ fn an_array_is_set_and_got_as_a_whole() {
     assert_eq!(get(&it, &[y], 2), Ok(vec![5, 6]));
     // The elements are in the order of their indices, not of the file.
     let second = it.config.table.position("x[2]").expect("it is there");
-    assert_eq!(it.slots[second].real(), 6.0);
+    assert_eq!(it.slots[second], Slot::from_real(6.0));
     for count in [0, 1, 3] {
         let why = get(&it, &[x], count).expect_err("refused");
         assert!(
@@ -223,7 +226,9 @@ fn the_line_s_state_and_reason_are_variables() {
     assert!(it.step(0.0, 0.01).is_ok());
     let state = |it: &Instance| {
         let mut state = -1;
-        let got = it.get(&[Place::State.reference()], 1, |_, found: i64| state = found);
+        let got = it.get(&[Place::State.reference()], 1, |_, found: i64| {
+            state = found;
+        });
         got.map(|()| state)
     };
     assert_eq!(state(&it), Ok(2), "running");

@@ -160,10 +160,16 @@ impl Instance {
     fn state(&self) -> i64 {
         let state = self.driver.as_ref().map(|driver| driver.link().state);
         let place = LinkState::ALL.iter().position(|one| Some(*one) == state);
-        place.and_then(|place| i64::try_from(place).ok()).unwrap_or(0)
+        place
+            .and_then(|place| i64::try_from(place).ok())
+            .unwrap_or(0)
     }
 
-    /// Refuses a wrong number of values for these variables.
+    /// Checks the number of values for these variables.
+    ///
+    /// # Errors
+    ///
+    /// The number is wrong.
     #[cold]
     pub fn check_count(&self, references: &[u32], count: usize) -> Result<(), String> {
         let right = self.exposed.count(references);

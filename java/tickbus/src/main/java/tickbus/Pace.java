@@ -73,7 +73,7 @@ public final class Pace {
             late = clock.getAsLong() - begin - turn * period;
         }
         turn += late / period;
-        missed += late / period;
+        missed = late / period;
         lag = late % period;
         return turn * period;
     }
@@ -88,7 +88,7 @@ public final class Pace {
     }
 
     /**
-     * How many turns were skipped so far.
+     * How many turns before the last one were skipped.
      *
      * @return counts from 0
      */

@@ -26,7 +26,7 @@ class PaceTest {
         assertTurn(30, 0, 0);
         now += 37;
         assertTurn(60, 7, 2);
-        assertTurn(70, 0, 2);
+        assertTurn(70, 0, 0);
         assertEquals(1070, now);
     }
 

@@ -73,6 +73,7 @@ fn split(name: &str) -> Option<(&str, Vec<u64>, bool)> {
         brackets.push(&inner[open + 1..]);
         rest = &inner[..open];
     }
+    rest = rest.trim_end();
     if rest.is_empty() || brackets.is_empty() {
         return None;
     }
@@ -121,6 +122,8 @@ mod tests {
         let plane = found(&["a[1,1]", "a[1,2]", "a[1,3]", "a[2,1]", "a[2,2]", "a[2,3]"]);
         let slots = vec![0, 1, 2, 3, 4, 5];
         assert_eq!(plane, [("a".to_owned(), slots, vec![2, 3])]);
+        let spaced = found(&["a [1]", "a [2]"]);
+        assert_eq!(spaced, [("a".to_owned(), vec![0, 1], vec![2])]);
         let nested = found(&["a.b[0][10]", "a.b[0][9]"]);
         assert_eq!(nested, [("a.b".to_owned(), vec![1, 0], vec![1, 2])]);
         let tens: Vec<String> = (1..=11).map(|index| format!("a[{index}]")).collect();
@@ -134,6 +137,7 @@ mod tests {
             &["a[1]"][..],
             &["a[1]", "a[3]"],
             &["a[1]", "a[01]"],
+            &["a[1]", "a [1]"],
             &["a[1]", "a[+2]"],
             &["a[1]", "a[2,1]"],
             &["a[1,1]", "a[1][2]"],

@@ -19,6 +19,8 @@ mod helics;
 mod iec2c;
 #[cfg(feature = "opcua")]
 mod java;
+#[cfg(target_os = "linux")]
+mod libmodbus;
 mod modbus;
 mod modbus_functions;
 mod modbus_lines;
@@ -60,6 +62,8 @@ fn main() -> ExitCode {
         #[cfg(feature = "opcua")]
         ("opcua", opcua::TESTS),
         ("modbus", modbus::TESTS),
+        #[cfg(target_os = "linux")]
+        ("libmodbus", libmodbus::TESTS),
         ("modbus_functions", modbus_functions::TESTS),
         ("modbus_lines", modbus_lines::TESTS),
         #[cfg(feature = "modbus-tls")]

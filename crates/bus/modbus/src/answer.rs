@@ -60,6 +60,53 @@ pub fn refuse(code: u8, exception: Exception, reply: &mut Vec<u8>) {
     reply.extend_from_slice(&[code | EXCEPTION_BIT, exception.0]);
 }
 
+/// The elements that a request names, in the order of its PDU; none for an incomplete one, and for functions without a table.
+pub(super) fn named(pdu: &[u8]) -> impl Iterator<Item = (Table, Span)> + use<> {
+    use Table::{Coils, DiscreteInputs, HoldingRegisters, InputRegisters};
+
+    let data = pdu.get(1..).unwrap_or_default();
+    let function = pdu.first().and_then(|code| Function::of(*code));
+    let at = |table, first: usize, count: Option<usize>| {
+        let word_at = |at: usize| data.get(at..at + 2).map(|_| word(data, at));
+        let count = count.map_or_else(|| word_at(first + 2), Some);
+        let span = word_at(first).zip(count);
+        span.map(|(first, count)| (table, Span { first, count }))
+    };
+    let both = match function {
+        Some(Function::ReadCoils | Function::WriteCoils) => [at(Coils, 0, None), None],
+        Some(Function::WriteCoil) => [at(Coils, 0, Some(1)), None],
+        Some(Function::ReadDiscreteInputs) => [at(DiscreteInputs, 0, None), None],
+        Some(Function::ReadInputRegisters) => [at(InputRegisters, 0, None), None],
+        Some(Function::ReadHoldingRegisters | Function::WriteRegisters) => {
+            [at(HoldingRegisters, 0, None), None]
+        }
+        Some(Function::WriteRegister | Function::MaskWriteRegister | Function::ReadFifoQueue) => {
+            [at(HoldingRegisters, 0, Some(1)), None]
+        }
+        Some(Function::ReadWriteRegisters) => {
+            [at(HoldingRegisters, 0, None), at(HoldingRegisters, 4, None)]
+        }
+        _ => [None, None],
+    };
+    both.into_iter().flatten()
+}
+
+/// Takes the last register, or the last eight bits, out of the answer whose PDU begins at `at` and ends with `bytes`. Answers
+/// of functions that read no elements stay as they are.
+pub(super) fn shorten(bytes: &mut Vec<u8>, at: usize) {
+    let width = match bytes.get(at).and_then(|code| Function::of(*code)) {
+        Some(Function::ReadCoils | Function::ReadDiscreteInputs) => 1,
+        Some(
+            Function::ReadHoldingRegisters
+            | Function::ReadInputRegisters
+            | Function::ReadWriteRegisters,
+        ) => 2,
+        _ => return,
+    };
+    bytes[at + 1] -= width;
+    bytes.truncate(bytes.len() - usize::from(width));
+}
+
 /// The length of the PDU of a request that starts like this, as soon as it can be told; in a stream nothing
 /// else delimits RTU. Functions of the standard that are refused here have one as well, if it is fixed.
 pub(super) fn length(beginning: &[u8]) -> Option<usize> {

@@ -1,6 +1,6 @@
 //! Modbus ASCII: telegrams as hexadecimal digits between a colon and CR LF, with a checksum over their bytes (LRC).
 
-use super::PDU_LIMIT;
+use super::{PDU_LIMIT, answer};
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::faults::WrongAnswer;
 
@@ -53,18 +53,17 @@ pub(crate) fn spoil(line: &mut Vec<u8>, begin: usize, wrong: WrongAnswer) {
     let Some(Some(bytes)) = bytes else {
         return;
     };
-    let Some((unit, mut pdu)) = parse(&bytes) else {
+    let Some((mut unit, pdu)) = parse(&bytes) else {
         return;
     };
-    let unit = match wrong {
-        WrongAnswer::Truncated => {
-            pdu = &pdu[..pdu.len() - 1];
-            unit
-        }
-        WrongAnswer::Transaction | WrongAnswer::Unit => unit.wrapping_add(1),
-    };
+    let mut pdu = pdu.to_vec();
+    match wrong {
+        WrongAnswer::Truncated => drop(pdu.pop()),
+        WrongAnswer::Short => answer::shorten(&mut pdu, 0),
+        WrongAnswer::Transaction | WrongAnswer::Unit => unit = unit.wrapping_add(1),
+    }
     line.truncate(begin);
-    append(unit, line, |to| to.extend_from_slice(pdu));
+    append(unit, line, |to| to.extend_from_slice(&pdu));
 }
 
 /// Unit and PDU of a telegram's bytes; `None` if their number or the checksum is wrong.
@@ -272,6 +271,7 @@ mod tests {
         for (wrong, expected) in [
             (WrongAnswer::Truncated, vec![1, 3, 2, 0, 0xFA]),
             (WrongAnswer::Unit, vec![2, 3, 2, 0, 7, 0xF2]),
+            (WrongAnswer::Short, vec![1, 3, 0, 0xFC]),
         ] {
             let mut line = b"kept".to_vec();
             append(1, &mut line, |pdu| pdu.extend([3, 2, 0, 7]));

@@ -36,6 +36,8 @@ pub struct Identification {
     pub objects: [String; OBJECTS],
     /// The answer to function 17, before the run indicator; `None` if the device does not have that function.
     pub server_id: Option<String>,
+    /// The additional data of function 17, behind the run indicator.
+    pub server_data: String,
 }
 
 impl Identification {
@@ -50,6 +52,7 @@ impl Identification {
         Self {
             objects,
             server_id: None,
+            server_data: String::new(),
         }
     }
 
@@ -77,9 +80,12 @@ impl Identification {
             return Err(Exception::ILLEGAL_DATA_VALUE);
         }
         let id = &id.as_bytes()[..id.len().min(TEXT_LIMIT)];
-        reply.push(u8::try_from(id.len() + 1).expect("shorter than a PDU"));
+        let data = self.server_data.as_bytes();
+        let data = &data[..data.len().min(TEXT_LIMIT - id.len())];
+        reply.push(u8::try_from(id.len() + 1 + data.len()).expect("shorter than a PDU"));
         reply.extend_from_slice(id);
         reply.push(RUNS);
+        reply.extend_from_slice(data);
         Ok(())
     }
 

@@ -21,6 +21,11 @@ pub(crate) const IDENTITY_KEYS: &[Key] = &[
         TEXT,
         "The answer to function 17, before the run indicator; without it function 17 is refused",
     ),
+    Key::new(
+        "server_data",
+        TEXT,
+        "The additional data of function 17, behind the run indicator",
+    ),
 ];
 
 /// Reads the table. Objects without a key are empty, and those from `url` on then do not exist.
@@ -29,7 +34,7 @@ pub(crate) fn read_identity(value: &Value<'_>) -> Option<Identification> {
         "[fieldbus.identity]",
         "write a table such as { vendor = \"ACME\", product = \"PLC 7\", revision = \"1.2\" }",
     )?;
-    let [texts @ .., server_id] = IDENTITY_KEYS else {
+    let [texts @ .., server_id, server_data] = IDENTITY_KEYS else {
         unreachable!("the list above is not empty");
     };
     let mut text = |key: &Key| {
@@ -55,8 +60,19 @@ pub(crate) fn read_identity(value: &Value<'_>) -> Option<Identification> {
             None => all_right = false,
         }
     }
-    let server_id = text(server_id);
+    let (server_id, server_data) = (text(server_id), text(server_data));
     table.finish();
-    let server_id = server_id?;
-    all_right.then_some(Identification { objects, server_id })
+    let (server_id, server_data) = (server_id?, server_data?);
+    if server_data.is_some() && server_id.is_none() {
+        value.wrong(
+            "\"server_data\" stands without \"server_id\"",
+            "write server_id, which comes before it in the answer to function 17",
+        );
+        return None;
+    }
+    all_right.then_some(Identification {
+        objects,
+        server_id,
+        server_data: server_data.unwrap_or_default(),
+    })
 }

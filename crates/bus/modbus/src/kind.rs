@@ -6,6 +6,7 @@ use crate::tls_options::Tls;
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Key, Table};
+use tickbus_fieldbus::faults::AnswerCodes;
 use tickbus_fieldbus::tcp::Writers;
 use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, CYCLE, NamedFile, OpenError, Role};
 use tickbus_image::signal::{Signal, SignalTable};
@@ -69,6 +70,13 @@ impl BusOptions for ServerOptions {
 
     fn has_answers(&self) -> bool {
         true
+    }
+
+    fn answer_codes(&self) -> AnswerCodes {
+        AnswerCodes {
+            has_pauses: matches!(self.line, Line::Tcp(_) | Line::RtuOverTcp(_)),
+            ..AnswerCodes::BYTE
+        }
     }
 
     fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {

@@ -1,6 +1,6 @@
 //! The header of Modbus TCP, in front of a PDU.
 
-use super::PDU_LIMIT;
+use super::{PDU_LIMIT, answer};
 use tickbus_fieldbus::faults::WrongAnswer;
 
 /// Transaction, protocol, length, unit.
@@ -83,9 +83,14 @@ pub fn append<R>(
         bytes.truncate(begin);
         return result;
     }
+    state_length(bytes, begin);
+    result
+}
+
+/// Writes the length of the telegram that begins at `begin`, the last one in `bytes`, into its header.
+fn state_length(bytes: &mut [u8], begin: usize) {
     let length = u16::try_from(bytes.len() - begin - 6).expect("a PDU is short");
     bytes[begin + 4..begin + 6].copy_from_slice(&length.to_be_bytes());
-    result
 }
 
 /// Spoils the last answer in `bytes`, which [`append`] wrote from `begin` on.
@@ -94,14 +99,12 @@ pub(crate) fn spoil(bytes: &mut Vec<u8>, begin: usize, wrong: WrongAnswer) {
         return;
     }
     match wrong {
-        WrongAnswer::Truncated => {
-            bytes.pop();
-            let length = u16::try_from(bytes.len() - begin - 6).expect("a PDU is short");
-            bytes[begin + 4..begin + 6].copy_from_slice(&length.to_be_bytes());
-        }
+        WrongAnswer::Truncated => drop(bytes.pop()),
+        WrongAnswer::Short => answer::shorten(bytes, begin + HEADER),
         WrongAnswer::Transaction => bytes[begin + 1] = bytes[begin + 1].wrapping_add(1),
         WrongAnswer::Unit => bytes[begin + 6] = bytes[begin + 6].wrapping_add(1),
     }
+    state_length(bytes, begin);
 }
 
 #[cfg(test)]

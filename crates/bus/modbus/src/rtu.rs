@@ -1,6 +1,6 @@
 //! Modbus RTU: telegrams with a checksum, delimited by silence, or in a TCP stream by their length.
 
-use super::{Function, PDU_LIMIT};
+use super::{Function, PDU_LIMIT, answer};
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::faults::WrongAnswer;
 
@@ -75,6 +75,7 @@ pub(crate) fn spoil(bytes: &mut Vec<u8>, begin: usize, wrong: WrongAnswer) {
     bytes.truncate(bytes.len() - CHECKSUM);
     match wrong {
         WrongAnswer::Truncated => drop(bytes.pop()),
+        WrongAnswer::Short => answer::shorten(bytes, begin + 1),
         WrongAnswer::Transaction | WrongAnswer::Unit => bytes[begin] = bytes[begin].wrapping_add(1),
     }
     let checksum = checksum(&bytes[begin..]);

@@ -32,7 +32,9 @@ pub(crate) const CODES: AnswerCodes = AnswerCodes {
         ("BadUserAccessDenied", 0x801F_0000),
         ("BadWaitingForInitialData", 0x8032_0000),
     ],
-    wrong: false,
+    wrong: &[],
+    has_elements: false,
+    has_pauses: false,
 };
 
 #[cfg(all(test, feature = "opcua"))]

@@ -3,7 +3,7 @@
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Key, Table, shown};
-use tickbus_fieldbus::faults::AnswerCodes;
+use tickbus_fieldbus::faults::{AnswerCodes, WrongAnswer};
 use tickbus_fieldbus::tcp::Writers;
 use tickbus_fieldbus::{
     At, Bus, BusKind, BusOptions, BusSetup, CYCLE, NamedFile, OBSERVES, OpenError, Role,
@@ -59,6 +59,12 @@ impl BusOptions for ServerOptions {
         // 255 is the code of an item that is done.
         AnswerCodes {
             range: (1, 0xFE),
+            wrong: &[
+                WrongAnswer::Truncated,
+                WrongAnswer::Transaction,
+                WrongAnswer::Unit,
+            ],
+            has_elements: false,
             ..AnswerCodes::BYTE
         }
     }

@@ -27,7 +27,7 @@ use super::{
     BusError, Cause, ChangeEvents, LinkState, LinkStatus, Medium, PlcState, Role, SwallowedSignals,
     Watch,
 };
-use crate::faults::{Diagnosis, FaultBoard, Spoilt, WrongAnswer};
+use crate::faults::{Diagnosis, FaultBoard, Request, Spoilt, WrongAnswer};
 use crate::traffic::{Traffic, Way};
 use faults::FaultLayer;
 use image::{ImagePort, Report};
@@ -373,7 +373,21 @@ impl Port {
     /// back](Self::take_lateness).
     #[inline]
     pub fn answer(&mut self, station: usize, function: u8, now: Nanos) -> Option<u8> {
-        let code = self.answer_status(station, function, now)?;
+        let names = &|_| false;
+        self.answer_request(
+            Request {
+                station,
+                function,
+                names,
+            },
+            now,
+        )
+    }
+
+    /// As [`answer`](Self::answer), for a bus whose faults depend on the elements of a request.
+    #[inline]
+    pub fn answer_request(&mut self, request: Request<'_>, now: Nanos) -> Option<u8> {
+        let code = self.any_answer(request, now)?;
         // A bus whose codes are bytes reads no others.
         u8::try_from(code).ok()
     }
@@ -381,25 +395,39 @@ impl Port {
     /// As [`answer`](Self::answer), for a bus whose codes are longer.
     #[inline]
     pub fn answer_status(&mut self, station: usize, function: u8, now: Nanos) -> Option<u32> {
+        let names = &|_| false;
+        self.any_answer(
+            Request {
+                station,
+                function,
+                names,
+            },
+            now,
+        )
+    }
+
+    #[inline]
+    fn any_answer(&mut self, request: Request<'_>, now: Nanos) -> Option<u32> {
         if self.faults.any() {
-            self.answer_by_faults(station, function, now)
+            self.answer_by_faults(request, now)
         } else {
             None
         }
     }
 
     #[cold]
-    fn answer_by_faults(&mut self, station: usize, function: u8, now: Nanos) -> Option<u32> {
+    fn answer_by_faults(&mut self, request: Request<'_>, now: Nanos) -> Option<u32> {
         self.faults.attend(now, &mut self.image);
-        let spoilt = self.faults.answer(station, function);
+        let spoilt = self.faults.answer(request);
         if self.spoilt.late == Nanos::ZERO {
             // The lateness of the answer before was taken.
             self.late.clear();
         }
         if spoilt.late > Nanos::ZERO {
-            self.late.push(station);
+            self.late.push(request.station);
         }
         self.spoilt.late = self.spoilt.late.max(spoilt.late);
+        self.spoilt.pause = self.spoilt.pause.max(spoilt.pause);
         self.spoilt.wrong = self.spoilt.wrong.or(spoilt.wrong);
         spoilt.error
     }
@@ -414,6 +442,12 @@ impl Port {
     #[inline]
     pub fn take_lateness(&mut self) -> Nanos {
         std::mem::take(&mut self.spoilt.late)
+    }
+
+    /// The time between two bytes of the answer that was made last; only the first call returns it.
+    #[inline]
+    pub fn take_pause(&mut self) -> Nanos {
+        std::mem::take(&mut self.spoilt.pause)
     }
 
     /// The stations whose answer that was made last is late; only the first call returns them.

@@ -294,6 +294,7 @@ fn a_device_has_the_names_that_its_maker_gave_it() {
     let who = Identification {
         objects: names,
         server_id: Some("FD7".to_owned()),
+        server_data: String::new(),
     };
     let ask = |pdu: &[u8]| {
         let map = map(Side::Sends, None);

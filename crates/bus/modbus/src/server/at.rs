@@ -114,7 +114,7 @@ impl ServerOptions {
     }
 
     /// The side of an area.
-    fn side(&self, area: Area) -> Side {
+    pub(super) fn side(&self, area: Area) -> Side {
         match (area, self.input) {
             (Area::Input, input) => input,
             (Area::Output, Side::Sends) => Side::Holds,

@@ -1,6 +1,9 @@
 //! The units of a server: each a station of the driver.
 
+use std::ops::Range;
+
 use tickbus_base::time::Nanos;
+use tickbus_fieldbus::faults::{Elements, Request};
 use tickbus_fieldbus::tcp::{Writer, Writers};
 use tickbus_fieldbus::{BusSetup, Events, Port, Receipt, Renewal};
 use tickbus_image::signal::fail_safe_frame;
@@ -20,6 +23,8 @@ pub(super) struct ServedUnits {
     /// True if a write is an event even without a change.
     every_write: bool,
     all: Box<[Unit]>,
+    /// The station, the side and the bits of each signal, in the order of the signal table.
+    signals: Box<[(usize, Side, Range<usize>)]>,
 }
 
 #[derive(Debug)]
@@ -88,6 +93,12 @@ impl ServedUnits {
         };
         Self {
             every_write: setup.events == Events::Writes,
+            signals: (table.signals.iter())
+                .map(|signal| {
+                    let bits = signal.address().bits();
+                    (signal.station, options.side(signal.area), bits)
+                })
+                .collect(),
             all: (0..table.stations.len()).map(unit).collect(),
         }
     }
@@ -144,7 +155,13 @@ impl ServedUnits {
             }
             let forbidden = !source.may_write && changes(pdu[0]);
             let forbidden = forbidden.then_some(Exception::ILLEGAL_FUNCTION.0);
-            let carried = match forbidden.or_else(|| port.answer(station, pdu[0], now)) {
+            let request = Request {
+                station,
+                function: pdu[0],
+                names: &|elements| self.names(station, pdu, elements),
+            };
+            let spoilt = || port.answer_request(request, now);
+            let carried = match forbidden.or_else(spoilt) {
                 Some(code) => {
                     let exception = Exception(code);
                     refuse(pdu[0], exception, reply);
@@ -155,6 +172,22 @@ impl ServedUnits {
             };
             self.end(station, pdu, &reply[begin..], false);
             carried
+        })
+    }
+
+    /// Returns true if a request to a station names these elements: as many as it reads or writes at once, and bits of the
+    /// signal among them.
+    fn names(&self, station: usize, pdu: &[u8], elements: Elements) -> bool {
+        answer::named(pdu).any(|(table, span)| {
+            let counts = elements
+                .quantity
+                .is_none_or(|number| usize::from(number) == span.count);
+            let has_signal = elements.signal.is_none_or(|signal| {
+                let (of, side, own) = &self.signals[signal];
+                let mut bits = self.all[station].map.bits(*side, (table, span));
+                *of == station && bits.any(|bits| bits.start < own.end && own.start < bits.end)
+            });
+            counts && has_signal
         })
     }
 

@@ -25,7 +25,7 @@ reserved = [{ at = "408503", count = 2 }]
 [[station]]
 name     = "drive"
 unit     = 3
-identity = { vendor = "ACME", product = "FD-7", revision = "V2.1", name = "Frequency drive", server_id = "FD7" }
+identity = { vendor = "ACME", product = "FD-7", revision = "V2.1", name = "Frequency drive", server_id = "FD7", server_data = "V2" }
 
 [[station]]
 name = "rack"
@@ -98,7 +98,7 @@ fn two_devices_have_their_own_places_and_names_behind_one_address() {
 
     assert_eq!(
         of_unit(&mut stream, 3, &[17]),
-        [17, 4, b'F', b'D', b'7', 0xFF]
+        [17, 6, b'F', b'D', b'7', 0xFF, b'V', b'2']
     );
     assert_eq!(of_unit(&mut stream, 7, &[17]), [0x91, 1]);
     let who = of_unit(&mut stream, 3, &[43, 14, 4, 4]);
@@ -217,4 +217,41 @@ fn a_wrong_answer_is_no_receipt_and_what_was_asked_is_done() {
             device.until("it is there", |end| end.get("speed") == 9.0);
         },
     );
+}
+
+#[test]
+fn a_fault_meets_the_requests_that_concern_one_signal_or_so_many_elements() {
+    let mut device = Alone::open(DEVICES, &KINDS);
+    let mut stream = client(device.address());
+    device.end.set("status", 0x1234.into());
+    device.end.tick();
+    let (status, both) = ([3, 0x21, 0x34, 0, 1], [3, 0x21, 0x34, 0, 2]);
+    let other = [6, 0, 0, 0, 8];
+    suffer(
+        &mut device,
+        "name = \"busy\"\nkind = \"answer-error\"\ncode = 6\nsignal = \"speed\"",
+    );
+    assert_eq!(of_unit(&mut stream, 3, &status), [3, 2, 0x12, 0x34]);
+    assert_eq!(of_unit(&mut stream, 3, &both), [0x83, 6]);
+    assert_eq!(of_unit(&mut stream, 3, &[6, 0x21, 0x35, 0, 9]), [0x86, 6]);
+    let first_writes = [23, 0x21, 0x34, 0, 1, 0x21, 0x35, 0, 1, 2, 0, 9];
+    assert_eq!(of_unit(&mut stream, 3, &first_writes), [0x97, 6]);
+    // The signal of the other unit has the same bits of its own image.
+    assert_eq!(of_unit(&mut stream, 7, &other), other);
+    // A reserved element carries no signal, and what does not exist concerns none.
+    let reserved = [3, 0x21, 0x36, 0, 1];
+    assert_eq!(of_unit(&mut stream, 3, &reserved), [3, 2, 0, 0]);
+    assert_eq!(of_unit(&mut stream, 3, &[3, 0x21, 0x34, 0, 9]), [0x83, 2]);
+    assert_eq!(device.end.get("speed"), 0.0);
+
+    let mut device = Alone::open(DEVICES, &KINDS);
+    let mut stream = client(device.address());
+    suffer(
+        &mut device,
+        "kind = \"answer-wrong\"\nhow = \"short\"\nsignal = \"status\"\nquantity = 2",
+    );
+    assert_eq!(of_unit(&mut stream, 3, &status), [3, 2, 0, 0]);
+    assert_eq!(of_unit(&mut stream, 3, &both), [3, 2, 0, 0]);
+    let three = [3, 0x21, 0x34, 0, 3];
+    assert_eq!(of_unit(&mut stream, 3, &three)[..2], [3, 6]);
 }

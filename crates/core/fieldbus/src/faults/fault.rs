@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::{AnswerEffect, AnswerTrouble, Condition, Diagnosis, WrongAnswer};
+use super::{AnswerEffect, AnswerTrouble, Condition, Diagnosis, Elements, Request, WrongAnswer};
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::short_number;
 use tickbus_image::signal::{DataType, Signal, SignalTable, Slot};
@@ -78,14 +78,16 @@ pub enum LineEffect {
 }
 
 impl LineEffect {
-    /// The trouble with an answer of `station` to a request with this function code, and how likely it is; `None` if this effect
-    /// does not change such answers.
-    pub(super) fn on_answer(self, station: usize, function: u8) -> Option<(f64, AnswerTrouble)> {
+    /// The trouble with the answer to a request, and how likely it is; `None` if this effect does not change such answers.
+    pub(super) fn on_answer(self, request: Request<'_>) -> Option<(f64, AnswerTrouble)> {
         let Self::Answer(effect) = self else {
             return None;
         };
-        let is_meant = effect.station.is_none_or(|meant| meant == station)
-            && effect.function.is_none_or(|meant| meant == function);
+        let is_meant = effect.station.is_none_or(|meant| meant == request.station)
+            && effect
+                .function
+                .is_none_or(|meant| meant == request.function)
+            && (effect.elements == Elements::default() || (request.names)(effect.elements));
         is_meant.then_some((effect.chance, effect.trouble))
     }
 }
@@ -156,7 +158,7 @@ impl Fault {
             Effect::Line(LineEffect::StationDown(_)) => "station-down",
             Effect::Line(LineEffect::Diagnosis(_)) => "diagnosis",
             Effect::Line(LineEffect::Answer(answer)) => match answer.trouble {
-                AnswerTrouble::Late(_) => "answer-late",
+                AnswerTrouble::Late { .. } => "answer-late",
                 AnswerTrouble::Error(_) => "answer-error",
                 AnswerTrouble::Wrong(_) => "answer-wrong",
             },
@@ -244,8 +246,16 @@ fn answered(answer: AnswerEffect, table: &SignalTable) -> String {
     let station = answer.station.map_or_else(String::new, |station| {
         format!(" of the station \"{}\"", table.stations[station].name)
     });
+    let Elements { signal, quantity } = answer.elements;
+    let quantity = quantity.map_or_else(String::new, |number| format!(" for {number} elements"));
+    let signal = signal.map_or_else(String::new, |signal| {
+        format!(" that concern \"{}\"", table.signals[signal].name)
+    });
     let trouble = match answer.trouble {
-        AnswerTrouble::Late(by) => format!("are {by} late"),
+        AnswerTrouble::Late { by, pause } if pause > Nanos::ZERO => {
+            format!("are {by} late, with {pause} between their bytes")
+        }
+        AnswerTrouble::Late { by, .. } => format!("are {by} late"),
         // Codes of four bytes are written as their standard has them.
         AnswerTrouble::Error(code @ 0x100..) => format!("are the error 0x{code:08X}"),
         AnswerTrouble::Error(code) => format!("are the error {code}"),
@@ -254,13 +264,14 @@ fn answered(answer: AnswerEffect, table: &SignalTable) -> String {
             "have the number of another request".to_owned()
         }
         AnswerTrouble::Wrong(WrongAnswer::Unit) => "come from another unit".to_owned(),
+        AnswerTrouble::Wrong(WrongAnswer::Short) => "lack their last element".to_owned(),
     };
     let chance = if answer.chance < 1.0 {
         format!(" with a chance of {}", short_number(answer.chance))
     } else {
         String::new()
     };
-    format!("answers{function}{station} {trouble}{chance}")
+    format!("answers{function}{quantity}{signal}{station} {trouble}{chance}")
 }
 
 /// `at 1200ms for 300ms`.

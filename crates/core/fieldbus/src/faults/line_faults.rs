@@ -8,7 +8,7 @@ use std::sync::atomic::Ordering;
 
 use self::outgoing::{Given, Outgoing};
 use super::ring::Ring;
-use super::{Diagnosis, FaultBoard, LineEffect, LineFault, Phase, Spoilt};
+use super::{Diagnosis, FaultBoard, LineEffect, LineFault, Phase, Request, Spoilt};
 use tickbus_base::time::Nanos;
 
 /// The combined effect of the active faults.
@@ -260,15 +260,15 @@ impl LineFaults {
         happens
     }
 
-    /// How the answer of `station` to a request with this function code is spoilt.
-    pub fn answer(&mut self, station: usize, function: u8) -> Spoilt {
+    /// How the answer to a request is spoilt.
+    pub fn answer(&mut self, request: Request<'_>) -> Spoilt {
         let mut spoilt = Spoilt::default();
         if !self.sum.spoils {
             return spoilt;
         }
         for fault in &mut self.faults {
             if fault.cell.phase() == Phase::Active
-                && let Some((chance, trouble)) = fault.trouble.on_answer(station, function)
+                && let Some((chance, trouble)) = fault.trouble.on_answer(request)
                 && fault.random.happens(chance)
             {
                 spoilt.add(trouble);

@@ -24,7 +24,9 @@ mod section;
 mod signal_fault;
 mod tick_time;
 
-pub use answer::{AnswerCodes, AnswerEffect, AnswerTrouble, Spoilt, WrongAnswer};
+pub use answer::{
+    AnswerCodes, AnswerEffect, AnswerTrouble, Elements, Request, Spoilt, WrongAnswer,
+};
 pub use board::FaultBoard;
 pub use cell::{FaultStatus, Phase};
 pub use condition::{Condition, unknown};

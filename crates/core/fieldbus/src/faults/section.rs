@@ -150,6 +150,8 @@ struct Keys<'a> {
     channel: Option<Value<'a>>,
     error: Option<Value<'a>>,
     function: Option<Value<'a>>,
+    quantity: Option<Value<'a>>,
+    pause: Option<Value<'a>>,
     code: Option<Value<'a>>,
     how: Option<Value<'a>>,
     octets: Option<Value<'a>>,
@@ -180,6 +182,8 @@ impl<'a> Keys<'a> {
             channel: table.take("channel"),
             error: table.take("error"),
             function: table.take("function"),
+            quantity: table.take("quantity"),
+            pause: table.take("pause"),
             code: table.take("code"),
             how: table.take("how"),
             octets: table.take("octets"),
@@ -196,7 +200,7 @@ impl<'a> Keys<'a> {
     }
 
     /// The keys that only some kinds have.
-    fn of_kinds(&self) -> [(&'static str, Option<&Value<'a>>); 16] {
+    fn of_kinds(&self) -> [(&'static str, Option<&Value<'a>>); 18] {
         [
             ("signal", self.signal.as_ref()),
             ("value", self.value.as_ref()),
@@ -209,6 +213,8 @@ impl<'a> Keys<'a> {
             ("channel", self.channel.as_ref()),
             ("error", self.error.as_ref()),
             ("function", self.function.as_ref()),
+            ("quantity", self.quantity.as_ref()),
+            ("pause", self.pause.as_ref()),
             ("code", self.code.as_ref()),
             ("how", self.how.as_ref()),
             ("octets", self.octets.as_ref()),
@@ -258,7 +264,7 @@ fn read(mut section: Table<'_>, scope: Option<Scope<'_>>) -> Option<Fault> {
     if let (Some(kind), Some(value), Some(scope)) = (known, &keys.kind, scope)
         && kind.name == "answer-wrong"
         && scope.has_answers
-        && !scope.codes.wrong
+        && scope.codes.wrong.is_empty()
     {
         value.wrong(
             "the telegrams of this bus are made by a library that makes no malformed ones",

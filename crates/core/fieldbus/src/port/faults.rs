@@ -7,7 +7,7 @@ use tickbus_base::time::Nanos;
 use tickbus_image::{BusEnd, Event};
 
 use super::image::{ImagePort, Report};
-use crate::faults::{Diagnosis, Fate, FaultBoard, LineFaults, Shape, Spoilt, Taken};
+use crate::faults::{Diagnosis, Fate, FaultBoard, LineFaults, Request, Shape, Spoilt, Taken};
 use crate::{Cause, LinkState, LinkStatus};
 
 /// Passes all calls to an [`ImagePort`], and distorts the data while line faults are active. Until the first fault is
@@ -227,11 +227,11 @@ impl FaultLayer {
         self.line.as_ref().is_some_and(|line| line.is_cut(station))
     }
 
-    /// How the answer of a station is spoilt.
+    /// How the answer to a request is spoilt.
     #[inline]
-    pub(super) fn answer(&mut self, station: usize, function: u8) -> Spoilt {
+    pub(super) fn answer(&mut self, request: Request<'_>) -> Spoilt {
         let line = self.line.as_mut();
-        line.map_or_else(Spoilt::default, |line| line.answer(station, function))
+        line.map_or_else(Spoilt::default, |line| line.answer(request))
     }
 
     pub(super) fn report_diagnoses_anew(&mut self) {

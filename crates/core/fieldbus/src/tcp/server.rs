@@ -577,8 +577,9 @@ impl<C> Client<C> {
                 Err(error) => return Err((telegrams, error.of_peer(self.peer))),
             }
             telegrams += 1;
-            let late = port.take_lateness();
-            if (late > Nanos::ZERO || !self.held.is_empty()) && reply.len() > begin {
+            let (late, pause) = (port.take_lateness(), port.take_pause());
+            let waits = late.max(pause) > Nanos::ZERO || !self.held.is_empty();
+            if waits && reply.len() > begin {
                 if self.held.len() == HELD {
                     let error = BusError::Protocol(format!(
                         "{} has asked {HELD} times without waiting for an answer",
@@ -588,7 +589,7 @@ impl<C> Client<C> {
                 }
                 let before = self.held.back();
                 let held = Held::new(before, reply.split_off(begin), (now, late), port);
-                self.held.push_back(held);
+                self.held.extend(held.apart(pause));
             }
         }
         if rest.len() > longest {

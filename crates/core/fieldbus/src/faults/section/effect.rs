@@ -6,8 +6,8 @@ use crate::faults::condition::unknown;
 use crate::faults::diagnosis::OCTET_LIMIT;
 use crate::faults::fault::{LATE_VALUES, MODEL};
 use crate::faults::{
-    AnswerCodes, AnswerEffect, AnswerTrouble, ChannelError, Diagnosis, Direction, Effect, Finding,
-    LineEffect, Octets, SignalEffect, WrongAnswer, measure,
+    AnswerCodes, AnswerEffect, AnswerTrouble, ChannelError, Diagnosis, Direction, Effect, Elements,
+    Finding, LineEffect, Octets, SignalEffect, WrongAnswer, measure,
 };
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Value, did_you_mean, short_number, shown};
@@ -38,16 +38,25 @@ pub(super) fn read_effect(
             let (chance, direction) = (read_chance(keys, Some(1.0)), read_direction(keys));
             line(LineEffect::Duplicate(chance?, direction?))
         }
-        "answer-late" => read_answer(keys, table, || read_hold(keys).map(AnswerTrouble::Late)),
-        "answer-error" => read_answer(keys, table, || {
-            let codes = scope.map_or(AnswerCodes::ANY, |scope| scope.codes);
+        "answer-late" => read_answer(keys, scope, |codes| {
+            let pause = keys.pause.as_ref();
+            let pause = pause.map_or(Some(Nanos::ZERO), |pause| read_pause(pause, codes));
+            Some(AnswerTrouble::Late {
+                by: read_hold(keys)?,
+                pause: pause?,
+            })
+        }),
+        "answer-error" => read_answer(keys, scope, |codes| {
             read_code(keys.code.as_ref()?, codes).map(AnswerTrouble::Error)
         }),
-        "answer-wrong" => read_answer(keys, table, || {
-            let how = keys
-                .how
-                .as_ref()?
-                .choice("faults of answers", &WrongAnswer::NAMES)?;
+        "answer-wrong" => read_answer(keys, scope, |codes| {
+            let known = WrongAnswer::NAMES;
+            let known = known.iter().filter(|(_, how)| codes.wrong.contains(how));
+            let known: Vec<_> = known.copied().collect();
+            if known.is_empty() {
+                return None;
+            }
+            let how = keys.how.as_ref()?.choice("faults of answers", &known)?;
             Some(AnswerTrouble::Wrong(how))
         }),
         "link-down" => line(LineEffect::LinkDown),
@@ -67,9 +76,11 @@ pub(super) fn read_effect(
 /// Reads which answers are wrong, and what is wrong by `trouble`.
 fn read_answer(
     keys: &Keys<'_>,
-    table: Option<&SignalTable>,
-    trouble: impl FnOnce() -> Option<AnswerTrouble>,
+    scope: Option<Scope<'_>>,
+    trouble: impl FnOnce(AnswerCodes) -> Option<AnswerTrouble>,
 ) -> Option<Effect> {
+    let table = scope.map(|scope| scope.table);
+    let codes = scope.map_or(AnswerCodes::ANY, |scope| scope.codes);
     let chance = read_chance(keys, Some(1.0));
     let station = match &keys.station {
         None => Some(None),
@@ -84,13 +95,75 @@ fn read_answer(
             .and_then(|code| u8::try_from(code).ok())
             .map(Some),
     };
-    let trouble = trouble();
+    let elements = read_elements(keys, table, codes);
+    let trouble = trouble(codes);
     Some(Effect::Line(LineEffect::Answer(AnswerEffect {
         station: station?,
         function: function?,
+        elements: elements?,
         chance: chance?,
         trouble: trouble?,
     })))
+}
+
+/// Reads the elements of the requests whose answers are wrong.
+fn read_elements(
+    keys: &Keys<'_>,
+    table: Option<&SignalTable>,
+    codes: AnswerCodes,
+) -> Option<Elements> {
+    let both = [("signal", &keys.signal), ("quantity", &keys.quantity)];
+    let stated = both
+        .iter()
+        .filter_map(|(key, value)| Some((key, value.as_ref()?)));
+    if !codes.has_elements {
+        let mut stated = stated.peekable();
+        let is_right = stated.peek().is_none();
+        for (key, value) in stated {
+            value.wrong(
+                format!("faults of answers do not depend on a \"{key}\" on this bus"),
+                "remove it; they do on \"modbus-server\"",
+            );
+        }
+        return is_right.then(Elements::default);
+    }
+    let signal = match &keys.signal {
+        None => Some(None),
+        Some(value) => table.and_then(|table| signal_of(value, table).map(Some)),
+    };
+    let quantity = match &keys.quantity {
+        None => Some(None),
+        Some(value) => value
+            .whole(1..=u16::MAX.into())
+            .and_then(|number| u16::try_from(number).ok())
+            .map(Some),
+    };
+    Some(Elements {
+        signal: signal?,
+        quantity: quantity?,
+    })
+}
+
+/// The signal that a value names.
+fn signal_of(value: &Value<'_>, table: &SignalTable) -> Option<usize> {
+    let name = value.text(SIGNAL)?;
+    let found = table.position(name);
+    if found.is_none() {
+        value.refuse(unknown(name, table));
+    }
+    found
+}
+
+/// Reads the time between two bytes of an answer.
+fn read_pause(value: &Value<'_>, codes: AnswerCodes) -> Option<Nanos> {
+    if !codes.has_pauses {
+        value.wrong(
+            "the bytes of an answer go out together on this line",
+            "remove it; \"modbus-server\" and \"s7-server\" have pauses over TCP",
+        );
+        return None;
+    }
+    at_most_the_longest(value)
 }
 
 /// Reads the code of an error, as a number or by its name.
@@ -116,7 +189,10 @@ pub fn model_value(value: Option<&Value<'_>>) -> Option<f64> {
 }
 
 fn read_hold(keys: &Keys<'_>) -> Option<Nanos> {
-    let value = keys.by.as_ref()?;
+    at_most_the_longest(keys.by.as_ref()?)
+}
+
+fn at_most_the_longest(value: &Value<'_>) -> Option<Nanos> {
     let by = value.duration()?;
     if by > LONGEST {
         value.wrong(
@@ -244,11 +320,7 @@ fn read_change(
     whole: bool,
 ) -> Option<Effect> {
     let (value, table) = (keys.signal.as_ref()?, table?);
-    let name = value.text(SIGNAL)?;
-    let Some(index) = table.position(name) else {
-        value.refuse(unknown(name, table));
-        return None;
-    };
+    let index = signal_of(value, table)?;
     let signal = &table.signals[index];
     let change = match kind {
         "stuck" => SignalEffect::Stuck(match &keys.value {

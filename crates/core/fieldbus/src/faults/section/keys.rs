@@ -38,7 +38,14 @@ pub(super) const CODE: &str =
 const CODES: Shape = Shape::Any(&[Shape::Whole(1, u32::MAX as i128), Shape::Text]);
 
 /// Which answers are wrong.
-const OF_ANSWERS: &[&str] = &["chance", "station", "function", "seed"];
+const OF_ANSWERS: &[&str] = &[
+    "chance", "station", "function", "signal", "quantity", "seed",
+];
+
+/// The same, and how the bytes of an answer go out.
+const OF_LATE_ANSWERS: &[&str] = &[
+    "chance", "station", "function", "signal", "quantity", "pause", "seed",
+];
 
 /// Earlier names of kinds, each with the name of today: accepted, and logged once.
 pub const FORMER_FAULT_KINDS: [(&str, &str); 1] = [("slow-answers", LATE_VALUES)];
@@ -68,7 +75,7 @@ pub const FAULT_KINDS: [TableKind; 15] = [
         &["direction", "seed"],
     ),
     kind("duplicate", &[], &["chance", "direction", "seed"]),
-    kind("answer-late", &[BY_TIME], OF_ANSWERS),
+    kind("answer-late", &[BY_TIME], OF_LATE_ANSWERS),
     kind("answer-error", &[key("code", CODES, CODE)], OF_ANSWERS),
     kind(
         "answer-wrong",
@@ -125,7 +132,7 @@ pub const FAULT_KEYS: &[Key] = &[
     Key::new(
         "signal",
         Shape::Text,
-        "The name of the signal that is wrong",
+        "The name of the signal that is wrong; answer-late, answer-error and answer-wrong: only requests that concern it",
     ),
     Key::new(
         "value",
@@ -159,6 +166,16 @@ pub const FAULT_KEYS: &[Key] = &[
         "function",
         Shape::Whole(1, 255),
         "The function code of the requests whose answers are wrong; all without this key",
+    ),
+    Key::new(
+        "quantity",
+        Shape::Whole(1, u16::MAX as i128),
+        "The number of elements in the requests whose answers are wrong; any without this key",
+    ),
+    Key::new(
+        "pause",
+        Shape::Duration,
+        "answer-late: the time between two bytes of the answer, at most 60s; none without this key",
     ),
     Key::new(
         "code",

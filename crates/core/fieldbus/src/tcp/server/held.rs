@@ -34,6 +34,26 @@ impl Held {
         }
     }
 
+    /// The same answer, byte by byte with this time between two of them; in one piece if it is zero.
+    pub(super) fn apart(self, pause: Nanos) -> impl Iterator<Item = Self> {
+        let size = if pause > Nanos::ZERO {
+            1
+        } else {
+            self.answer.len()
+        };
+        let mut due = self.due;
+        let pieces: Vec<Vec<u8>> = self.answer.chunks(size).map(<[u8]>::to_vec).collect();
+        pieces.into_iter().map(move |answer| {
+            let piece = Self {
+                due,
+                answer,
+                stations: self.stations.clone(),
+            };
+            due = due + pause;
+            piece
+        })
+    }
+
     /// Returns true if a station of it is dead: that sends nothing, not even the answer that it owes.
     pub(super) fn is_lost(&self, now: Nanos, port: &mut Port) -> bool {
         // A protocol may answer for more stations than its line has.

@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use super::*;
 use crate::faults::{
-    AnswerEffect, AnswerTrouble, Begin, Effect, Fault, FaultBoard, Faults, Lasts, LineEffect,
-    Slots, TickTime,
+    AnswerEffect, AnswerTrouble, Begin, Effect, Elements, Fault, FaultBoard, Faults, Lasts,
+    LineEffect, Slots, TickTime,
 };
 use crate::{LinkState, LinkStatus, Role};
 use tickbus_base::time::{Clock, Manual, Monotonic};
@@ -437,8 +437,12 @@ fn answers_that_a_fault_holds_back_go_out_in_order_at_their_time() {
     let fault = server.inject(LineEffect::Answer(AnswerEffect {
         station: None,
         function: Some(7),
+        elements: Elements::default(),
         chance: 1.0,
-        trouble: AnswerTrouble::Late(Nanos::from_millis(50)),
+        trouble: AnswerTrouble::Late {
+            by: Nanos::from_millis(50),
+            pause: Nanos::ZERO,
+        },
     }));
     // The middle one is late, and the last one waits behind it.
     client
@@ -466,4 +470,36 @@ fn answers_that_a_fault_holds_back_go_out_in_order_at_their_time() {
     server.bring_up(down);
     server.bring_up(fault);
     ask(&mut client, &[2, 5, 6]);
+}
+
+#[test]
+fn the_bytes_of_an_answer_can_go_out_one_by_one() {
+    let mut server = Running::new();
+    let mut client = server.client();
+    ask(&mut client, &[1, 1]);
+    server.inject(LineEffect::Answer(AnswerEffect {
+        station: None,
+        function: None,
+        elements: Elements::default(),
+        chance: 1.0,
+        trouble: AnswerTrouble::Late {
+            by: Nanos::ZERO,
+            pause: Nanos::from_millis(5),
+        },
+    }));
+    client.write_all(&[3, 7, 8, 9]).expect("the server reads");
+    let mut byte = [0];
+    client.read_exact(&mut byte).expect("the first one");
+    for expected in [7, 8, 9] {
+        client.set_nonblocking(true).expect("an option");
+        server.pass(Nanos::from_millis(4));
+        server.until(|server| server.clock.is_settled(1));
+        let early = client.read(&mut byte).expect_err("the next one has time");
+        assert_eq!(early.kind(), ErrorKind::WouldBlock);
+        client.set_nonblocking(false).expect("an option");
+        server.clock.advance(Nanos::from_millis(1));
+        client.read_exact(&mut byte).expect("it is due");
+        assert_eq!(byte, [expected]);
+    }
+    server.until(|server| server.fact("test.replied").as_deref() == Some("2"));
 }

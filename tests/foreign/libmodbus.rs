@@ -1,0 +1,60 @@
+//! The unit test of libmodbus, a client in C that expects special answers, against a server whose faults make them.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use crate::harness::{self, Absent, Test};
+
+pub(crate) const TESTS: &[(&str, Test)] = &[(
+    "its_unit_test_passes_line_by_line",
+    its_unit_test_passes_line_by_line,
+)];
+
+/// The lines of the client that say OK, in version 3.1.6 over TCP.
+const LINES: usize = 110;
+
+/// A line that can fail on some platforms, by the client's own words: a time-out of 1 µs.
+const UNSURE: &str = "4/8 1us response timeout: ";
+
+/// The one line that a busy computer can spoil: bytes that come 5 ms apart have to arrive within 7 ms.
+const TIMED: &str = "2/2 Adapted byte timeout (7ms > 5ms): ";
+
+fn path(file: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(file)
+}
+
+fn its_unit_test_passes_line_by_line() -> Result<(), Absent> {
+    let client = path("target/peers/libmodbus/unit-test-client");
+    if !client.exists() {
+        return Err(Absent(
+            "the unit test of libmodbus is not built; run tools/peers".to_owned(),
+        ));
+    }
+    harness::command_with("ip", "-V", "iproute2")?;
+    let mut alone = harness::command("unshare", "util-linux")?;
+    let may = alone.args(["--map-root-user", "--net", "true"]).status();
+    if !may.is_ok_and(|status| status.success()) {
+        return Err(Absent(
+            "this user can make no network of its own".to_owned(),
+        ));
+    }
+    let mut told = String::new();
+    for _ in 0..5 {
+        let output = Command::new(path("tests/peers/libmodbus/run"))
+            .arg(env!("CARGO_BIN_EXE_tickbus"))
+            .arg(&client)
+            .output()
+            .expect("it runs");
+        told = String::from_utf8_lossy(&output.stdout).into_owned();
+        let lines = told.lines().filter(|line| line.ends_with("OK")).count();
+        let unsure = told.contains(&format!("{UNSURE}FAILED"));
+        if output.status.success() {
+            assert_eq!(lines + usize::from(unsure), LINES, "{told}");
+            assert!(told.contains("ALL TESTS PASS WITH SUCCESS"), "{told}");
+            return Ok(());
+        }
+        assert!(told.contains(TIMED), "{told}");
+        assert!(!told.contains(&format!("{TIMED}OK")), "{told}");
+    }
+    panic!("the bytes come too late each time: {told}")
+}

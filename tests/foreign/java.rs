@@ -24,7 +24,12 @@ pub(crate) const TESTS: &[(&str, Test)] = &[
         plc4x_over_s7,
     ),
     ("plc4x_drives_the_opcua_server", plc4x_over_opcua),
+    (
+        "plc4x_drives_devices_at_their_own_places",
+        plc4x_at_own_places,
+    ),
     ("milo_drives_the_opcua_server", milo_as_client),
+    ("milo_drives_a_device_at_its_own_nodes", milo_at_own_nodes),
     ("opcua_client_drives_a_server_of_milo", milo_as_server),
 ];
 
@@ -235,6 +240,62 @@ fn plc4x_over_opcua() -> Result<(), Absent> {
     };
     let url = format!("opcua:tcp://{address}?discovery=true");
     plc4x(&mut machine, &url, &tags)
+}
+
+/// Nodes in the namespaces of a maker, which are numbers 2 and 3.
+const OWN_NODES: &str = "namespaces = [\"http://opcfoundation.org/UA/DI/\", \"http://acme.example/press/\"]\n\
+    at = { run = \"ns=3;s=Press.Run\", speed = \"ns=3;i=6001\", torque = \"ns=3;i=6002\", sensor = \"ns=2;i=7\", \
+    position = \"nsu=http://acme.example/press/;i=6003\", pressure = \"ns=3;s=Press.Pressure\" }";
+
+fn plc4x_at_own_places() -> Result<(), Absent> {
+    let mut machine = open(
+        "kind = \"modbus-server\"\naddress = \"127.0.0.1:0\"\nat = { run = \"coil:65536\", speed = \"408502\", \
+         torque = \"408503\", sensor = \"100008\", position = \"303202\", pressure = \"408510\" }",
+    );
+    let url = format!("modbus-tcp:tcp://{}", machine.address());
+    let tags = Tags {
+        run: "coil:65536",
+        speed: "holding-register:8502:INT",
+        torque: "holding-register:8503:REAL",
+        sensor: "discrete-input:8",
+        position: "input-register:3202:INT",
+        pressure: "holding-register:8510:REAL",
+    };
+    plc4x(&mut machine, &url, &tags)?;
+
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut machine = open(&format!(
+        "{OPCUA_SERVER}\npki = {:?}\n{OWN_NODES}",
+        folder.path().display().to_string()
+    ));
+    let tags = Tags {
+        run: "ns=3;s=Press.Run;BOOL",
+        speed: "ns=3;i=6001;INT",
+        torque: "ns=3;i=6002;REAL",
+        sensor: "ns=2;i=7;BOOL",
+        position: "ns=3;i=6003;INT",
+        pressure: "ns=3;s=Press.Pressure;REAL",
+    };
+    let url = format!("opcua:tcp://{}?discovery=true", machine.address());
+    plc4x(&mut machine, &url, &tags)
+}
+
+fn milo_at_own_nodes() -> Result<(), Absent> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut machine = open(&format!(
+        "{OPCUA_SERVER}\npki = {:?}\n{OWN_NODES}",
+        folder.path().display().to_string()
+    ));
+    let url = format!("opc.tcp://{}", machine.address());
+    let mut milo = Peer::start(&mut machine, "MiloClient", &[&url])?;
+    let speed = "ns=3;i=6001";
+    let written = milo.ask(&mut machine, &["write", speed, "Int16", "-1234"]);
+    assert_eq!(written, "good");
+    until_value(&mut machine, "speed", -1234.0);
+    assert_eq!(milo.ask(&mut machine, &["read", speed]), "-1234");
+    machine.set("position", 42.0);
+    milo.ask_until(&mut machine, &["read", "ns=3;i=6003"], "42");
+    Ok(())
 }
 
 fn milo_as_client() -> Result<(), Absent> {

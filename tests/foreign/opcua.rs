@@ -4,6 +4,7 @@
 mod device;
 mod places;
 mod served;
+mod structures;
 
 use std::path::{Path, PathBuf};
 
@@ -72,6 +73,10 @@ pub(crate) const TESTS: &[(&str, Test)] = &[
     (
         "asyncua_reads_and_writes_arrays_and_structures_whose_parts_are_signals",
         places::has_arrays_and_structures,
+    ),
+    (
+        "asyncua_reaches_every_member_of_structures_in_arrays_and_of_unions",
+        structures::reach_every_member,
     ),
     (
         "each_station_has_an_age_of_its_own_and_what_was_just_written_is_good",

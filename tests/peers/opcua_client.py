@@ -18,7 +18,8 @@ has a session, or "refused WHY", then obeys a line of JSON from stdin at a time,
     {"call": [object, method]}       {"status"}
     {"compare": file, "namespace": uri}  {"nodes", "differ": [texts]}: asyncua's own import of the file beside the server
     {"structure": node, "set": {member: value}}  {"value", "status"}: a structure as JSON, by the server's definitions;
-                                     with "set" it is written with these members
+                                     with "set" it is written with these members; {"of": name, member: value} is a
+                                     structure of that name
     {"range": [node, range, type, values]}   {"status"} of a Write with an IndexRange; null values read: {"value"}
     {"stop": true}                   and at the end of stdin
 """
@@ -53,6 +54,15 @@ async def make_certificate(folder, uri):
         [ExtendedKeyUsageOID.CLIENT_AUTH],
         {"countryName": "EU", "stateOrProvinceName": "x", "localityName": "x", "organizationName": "ACME"},
     )
+
+
+def made(value):
+    """A value with its structures."""
+    if isinstance(value, list):
+        return [made(one) for one in value]
+    if isinstance(value, dict):
+        return getattr(ua, value["of"])(**{name: made(one) for name, one in value.items() if name != "of"})
+    return value
 
 
 ATTRIBUTES = [ua.AttributeIds.NodeClass, ua.AttributeIds.BrowseName, ua.AttributeIds.DisplayName]
@@ -224,7 +234,7 @@ async def serve(client):
                 inner = value
                 for name in way:
                     inner = getattr(inner, name)
-                setattr(inner, last, new)
+                setattr(inner, last, made(new))
             if "set" in line:
                 wrote = await client.uaclient.write_attributes([one.nodeid], [ua.DataValue(value)])
                 answer["status"] = wrote[0].name

@@ -5,9 +5,11 @@ use std::sync::Arc;
 use opcua::types::custom::{DataTypeTree, DynamicStructure, StructTypeInfo};
 use opcua::types::{
     Array, ByteString, DateTime, ExpandedNodeId, ExtensionObject, Guid, LocalizedText, NodeId,
-    QualifiedName, StatusCode, UAString, Variant, VariantScalarTypeId, VariantTypeId,
+    QualifiedName, StatusCode, StructureType, UAString, Variant, VariantScalarTypeId,
+    VariantTypeId,
 };
 
+use super::structure::{Exact, selected};
 use crate::Step;
 
 /// The most elements of an array with signals.
@@ -16,15 +18,41 @@ const LONGEST: usize = 10_000;
 /// The most values, structures and arrays in a variable with signals.
 const MOST: usize = 100_000;
 
+/// The name of the number that says which member a union has (OPC 10000-6, 5.2.8).
+const SWITCH: &str = "SwitchField";
+
 /// A value, or a part of it.
 #[derive(Clone, Debug)]
 pub(super) enum Content {
     /// A value without members.
     Leaf(Variant),
     /// The elements of an array.
-    List(VariantScalarTypeId, Vec<Content>),
+    List(Elements),
     /// The members of a structure.
     Structure(Arc<StructTypeInfo>, Vec<Content>),
+    /// A member of a structure that can be missing.
+    Optional(Box<Content>, Presence),
+    /// The number of the member that a union has, from 1 or 0 for none, and before that all members that it can have.
+    Union(Arc<StructTypeInfo>, Vec<Content>),
+}
+
+/// The elements of an array.
+#[derive(Clone, Debug)]
+pub(super) struct Elements {
+    of_type: VariantScalarTypeId,
+    /// An element that is zero or empty.
+    empty: Arc<Content>,
+    all: Vec<Content>,
+}
+
+/// Whether a member that can be missing is there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Presence {
+    Missing,
+    /// A client wrote it.
+    Written,
+    /// It is or has a signal, and is always there.
+    Signal,
 }
 
 /// The type of a variable or of a member.
@@ -53,7 +81,11 @@ impl Content {
                 }
                 let element = Self::single(of_type, shape.data_type, tree)?;
                 bounded(element.count() * length)?;
-                Ok(Self::List(of_type, vec![element; length]))
+                Ok(Self::List(Elements {
+                    of_type,
+                    all: vec![element.clone(); length],
+                    empty: Arc::new(element),
+                }))
             }
             rank => Err(format!("it has {rank} dimensions, and signals need one")),
         }
@@ -84,16 +116,18 @@ impl Content {
                 bounded(count)?;
                 Ok(member)
             });
-            match member.map_err(|why| format!("{}: {why}", field.name))? {
-                // async-opcua 0.19 states a wrong length for them.
-                Self::List(VariantScalarTypeId::ExtensionObject, _) => Err(format!(
-                    "{}: an array of structures within a structure cannot have signals",
-                    field.name
-                )),
-                member => Ok(member),
-            }
+            let member = member.map_err(|why| format!("{}: {why}", field.name))?;
+            Ok(if field.is_optional {
+                Self::Optional(Box::new(member), Presence::Missing)
+            } else {
+                member
+            })
         });
-        let members = members.collect::<Result<_, _>>()?;
+        let mut members = members.collect::<Result<Vec<_>, String>>()?;
+        if info.structure_type == StructureType::Union {
+            members.push(Self::Leaf(0_u32.into()));
+            return Ok(Self::Union(Arc::clone(info), members));
+        }
         Ok(Self::Structure(Arc::clone(info), members))
     }
 
@@ -101,8 +135,9 @@ impl Content {
     fn count(&self) -> usize {
         match self {
             Self::Leaf(_) => 1,
-            Self::List(_, members) | Self::Structure(_, members) => {
-                1 + members.iter().map(Self::count).sum::<usize>()
+            Self::Optional(member, _) => member.count(),
+            Self::List(Elements { all, .. }) | Self::Structure(_, all) | Self::Union(_, all) => {
+                1 + all.iter().map(Self::count).sum::<usize>()
             }
         }
     }
@@ -113,29 +148,46 @@ impl Content {
     ///
     /// There is no such member.
     pub(super) fn find(&mut self, steps: &[Step], has_length: bool) -> Result<Vec<usize>, String> {
+        if let Self::Optional(member, presence) = self {
+            *presence = Presence::Signal;
+            return member.find(steps, has_length);
+        }
         let Some((step, rest)) = steps.split_first() else {
             return match self {
-                Self::Leaf(_) => Ok(Vec::new()),
                 Self::List(..) => Err("an array is not a single value".to_owned()),
                 Self::Structure(..) => Err("a structure is not a single value".to_owned()),
+                Self::Union(..) => Err("a union is not a single value".to_owned()),
+                _ => Ok(Vec::new()),
             };
         };
         let (at, member, has_length) = match (self, step) {
-            (Self::List(of_type, elements), Step::Element(at)) => {
-                if *at >= elements.len() {
-                    let length = elements.len();
-                    let Some(zero) = zero(*of_type).filter(|_| !has_length && *at < LONGEST) else {
-                        return Err(format!("the last element is [{}]", length.max(1) - 1));
-                    };
-                    elements.resize(at + 1, Self::Leaf(zero));
+            (Self::List(Elements { empty, all, .. }), Step::Element(at)) => {
+                if *at >= all.len() {
+                    if has_length || *at >= LONGEST {
+                        return Err(format!("the last element is [{}]", all.len().max(1) - 1));
+                    }
+                    bounded(empty.count() * (at + 1))?;
+                    all.resize(at + 1, (**empty).clone());
                 }
-                (*at, &mut elements[*at], true)
+                (*at, &mut all[*at], true)
             }
-            (Self::Structure(info, members), Step::Member(name)) => {
+            (Self::Union(info, all), Step::Member(name))
+                if name == SWITCH && !info.index_by_name.contains_key(name) =>
+            {
+                let at = all.len() - 1;
+                (at, &mut all[at], true)
+            }
+            (Self::Structure(info, members) | Self::Union(info, members), Step::Member(name)) => {
                 let Some(at) = info.index_by_name.get(name) else {
-                    let names = info.fields.iter().map(|field| field.name.as_str());
-                    let names = names.collect::<Vec<_>>().join(", ");
-                    return Err(format!("the members are {names}"));
+                    let mut names: Vec<&str> = info
+                        .fields
+                        .iter()
+                        .map(|field| field.name.as_str())
+                        .collect();
+                    if info.structure_type == StructureType::Union {
+                        names.push(SWITCH);
+                    }
+                    return Err(format!("the members are {}", names.join(", ")));
                 };
                 let sizes = info.fields[*at].array_dimensions.as_ref();
                 let has_length = sizes.is_some_and(|sizes| sizes.iter().any(|size| *size > 0));
@@ -144,37 +196,71 @@ impl Content {
             (Self::List(..), Step::Member(_)) => {
                 return Err("an array has elements: [0]".to_owned());
             }
-            (Self::Structure(..), Step::Element(_)) => {
+            (Self::Structure(..) | Self::Union(..), Step::Element(_)) => {
                 return Err("a structure has members: .name".to_owned());
             }
-            (Self::Leaf(_), _) => return Err("a single value has no members".to_owned()),
+            _ => return Err("a single value has no members".to_owned()),
         };
         let mut indices = vec![at];
         indices.extend(member.find(rest, has_length)?);
         Ok(indices)
     }
 
-    /// All members are found: an array without any can have any length.
-    pub(super) fn close(&mut self) {
+    /// All members are found, at these `places`: an array without any can have any length, and a union has the only member
+    /// with signals, unless its number is a signal.
+    ///
+    /// # Errors
+    ///
+    /// Signals are in two members of a union, and its number is none.
+    pub(super) fn close(&mut self, places: &[&[usize]]) -> Result<(), String> {
+        let of_member = |at: usize| -> Vec<&[usize]> {
+            let places = places.iter().filter_map(|place| place.split_first());
+            let places = places.filter(|(first, _)| **first == at);
+            places.map(|(_, rest)| rest).collect()
+        };
         match self {
             Self::Leaf(_) => {}
-            Self::List(of_type, elements) if elements.is_empty() => {
+            Self::Optional(member, _) => member.close(places)?,
+            Self::List(Elements { of_type, all, .. }) if all.is_empty() => {
                 let none = Array::new(*of_type, Vec::new());
                 *self = Self::Leaf(none.map_or(Variant::Empty, Variant::from));
             }
-            Self::List(_, members) | Self::Structure(_, members) => {
-                members.iter_mut().for_each(Self::close);
+            Self::List(Elements { all, .. }) | Self::Structure(_, all) => {
+                for (at, member) in all.iter_mut().enumerate() {
+                    member.close(&of_member(at))?;
+                }
+            }
+            Self::Union(info, all) => {
+                let switch = all.len() - 1;
+                let with_signals = (0..switch).filter(|at| !of_member(*at).is_empty());
+                let with_signals: Vec<usize> = with_signals.collect();
+                if of_member(switch).is_empty() {
+                    if with_signals.len() > 1 {
+                        return Err(format!(
+                            "the union {} has one member at a time; give a signal to its .{SWITCH}, too",
+                            info.name
+                        ));
+                    }
+                    let number = with_signals.first().map_or(0, |at| at + 1);
+                    all[switch] = Self::Leaf(u32::try_from(number).unwrap_or_default().into());
+                }
+                for (at, member) in all.iter_mut().enumerate() {
+                    member.close(&of_member(at))?;
+                }
             }
         }
+        Ok(())
     }
 
     /// The leaf with these indices.
     pub(super) fn leaf(&mut self, indices: &[usize]) -> &mut Variant {
         match (self, indices.split_first()) {
             (Self::Leaf(value), _) => value,
-            (Self::List(_, members) | Self::Structure(_, members), Some((at, rest))) => {
-                members[*at].leaf(rest)
-            }
+            (Self::Optional(member, _), _) => member.leaf(indices),
+            (
+                Self::List(Elements { all, .. }) | Self::Structure(_, all) | Self::Union(_, all),
+                Some((at, rest)),
+            ) => all[*at].leaf(rest),
             _ => unreachable!("indices were found in this value"),
         }
     }
@@ -184,14 +270,37 @@ impl Content {
         let all = |members: &[Self]| members.iter().map(|member| member.variant(tree)).collect();
         match self {
             Self::Leaf(value) => value.clone(),
-            Self::List(of_type, elements) => {
-                let values: Vec<Variant> = all(elements);
-                Array::new(*of_type, values).map_or(Variant::Empty, Variant::from)
+            Self::Optional(_, Presence::Missing) => Variant::Empty,
+            Self::Optional(member, _) => member.variant(tree),
+            Self::List(elements) => {
+                let values: Vec<Variant> = all(&elements.all);
+                Array::new(elements.of_type, values).map_or(Variant::Empty, Variant::from)
             }
             Self::Structure(info, members) => {
                 let made =
                     DynamicStructure::new_struct(Arc::clone(info), Arc::clone(tree), all(members));
-                made.map_or(Variant::Empty, |made| ExtensionObject::new(made).into())
+                made.map_or(Variant::Empty, |made| {
+                    ExtensionObject::new(Exact(made)).into()
+                })
+            }
+            Self::Union(info, members) => {
+                let (info, tree_of) = (Arc::clone(info), Arc::clone(tree));
+                let at = number(members).and_then(|number| Some((number, number.checked_sub(1)?)));
+                let member = at.and_then(|(number, at)| {
+                    let at = usize::try_from(at).ok()?;
+                    let member = members.get(at).filter(|_| at + 1 < members.len())?;
+                    Some((number, member.variant(tree)))
+                });
+                let made = match member {
+                    Some((number, value)) => {
+                        DynamicStructure::new_union(info, tree_of, value, number)
+                    }
+                    // No member, or a number that the machine made up.
+                    None => Ok(DynamicStructure::new_null_union(info, tree_of)),
+                };
+                made.map_or(Variant::Empty, |made| {
+                    ExtensionObject::new(Exact(made)).into()
+                })
             }
         }
     }
@@ -204,7 +313,21 @@ impl Content {
     pub(super) fn take(&mut self, written: &Variant) -> Result<(), StatusCode> {
         let mismatch = Err(StatusCode::BadTypeMismatch);
         match (self, written) {
-            (Self::List(of_type, elements), Variant::Array(array)) => {
+            // A member with a signal that is left out keeps its value.
+            (Self::Optional(_, presence), Variant::Empty) => {
+                if *presence == Presence::Written {
+                    *presence = Presence::Missing;
+                }
+                Ok(())
+            }
+            (Self::Optional(member, presence), written) => {
+                member.take(written)?;
+                if *presence == Presence::Missing {
+                    *presence = Presence::Written;
+                }
+                Ok(())
+            }
+            (Self::List(Elements { of_type, all, .. }), Variant::Array(array)) => {
                 let is_list = array
                     .dimensions
                     .as_ref()
@@ -212,35 +335,51 @@ impl Content {
                 if array.value_type != *of_type || !is_list {
                     return mismatch;
                 }
-                if elements.len() != array.values.len() {
+                if all.len() != array.values.len() {
                     return mismatch;
                 }
-                let pairs = elements.iter_mut().zip(&array.values);
+                let pairs = all.iter_mut().zip(&array.values);
                 pairs.into_iter().try_for_each(|(of, value)| of.take(value))
             }
             // A ByteString is an array of bytes, too (OPC 10000-4, 5.10.4).
-            (Self::List(VariantScalarTypeId::Byte, elements), Variant::ByteString(bytes)) => {
+            (Self::List(Elements { of_type, all, .. }), Variant::ByteString(bytes))
+                if *of_type == VariantScalarTypeId::Byte =>
+            {
                 let bytes = bytes.value.as_deref().unwrap_or_default();
-                if elements.len() != bytes.len() {
+                if all.len() != bytes.len() {
                     return mismatch;
                 }
-                for (of, byte) in elements.iter_mut().zip(bytes) {
+                for (of, byte) in all.iter_mut().zip(bytes) {
                     *of = Self::Leaf((*byte).into());
                 }
                 Ok(())
             }
             (Self::Structure(info, members), Variant::ExtensionObject(object)) => {
-                let written = object.inner_as::<DynamicStructure>();
-                let is_same = object
-                    .data_type()
-                    .is_some_and(|id| id.node_id == info.node_id);
-                match written.map(DynamicStructure::values).filter(|_| is_same) {
+                match of_type(object, info).map(DynamicStructure::values) {
                     Some(values) if values.len() == members.len() => {
                         let mut pairs = members.iter_mut().zip(values);
                         pairs.try_for_each(|(of, value)| of.take(value))
                     }
                     _ => mismatch,
                 }
+            }
+            (Self::Union(info, members), Variant::ExtensionObject(object)) => {
+                let written = of_type(object, info);
+                let Some((written, number)) = written.and_then(|it| Some((it, selected(it)?)))
+                else {
+                    return mismatch;
+                };
+                // The crate has checked the number.
+                if let (Some(value), Some(at)) = (written.values().first(), number.checked_sub(1)) {
+                    let at = usize::try_from(at).unwrap_or(usize::MAX);
+                    let Some(member) = members.get_mut(at) else {
+                        return mismatch;
+                    };
+                    member.take(value)?;
+                }
+                let switch = members.len() - 1;
+                members[switch] = Self::Leaf(number.into());
+                Ok(())
             }
             (Self::Leaf(value), written) if kind(value) == kind(written) => {
                 *value = written.clone();
@@ -261,19 +400,38 @@ impl Content {
         last: usize,
         written: &Variant,
     ) -> Result<(), StatusCode> {
-        let Self::List(of_type, elements) = self else {
+        let Self::List(elements) = self else {
             return Err(StatusCode::BadIndexRangeNoData);
         };
-        let Some(range) = elements.get_mut(first..=last) else {
+        let Some(range) = elements.all.get_mut(first..=last) else {
             return Err(StatusCode::BadIndexRangeNoData);
         };
-        let mut part = Self::List(*of_type, range.to_vec());
+        let mut part = Self::List(Elements {
+            all: range.to_vec(),
+            empty: Arc::clone(&elements.empty),
+            of_type: elements.of_type,
+        });
         part.take(written)?;
-        if let Self::List(_, taken) = part {
-            range.clone_from_slice(&taken);
+        if let Self::List(Elements { all, .. }) = part {
+            range.clone_from_slice(&all);
         }
         Ok(())
     }
+}
+
+/// The number of the member that a union has, which is the last of `members`.
+fn number(members: &[Content]) -> Option<u32> {
+    match members.last()? {
+        Content::Leaf(Variant::UInt32(number)) => Some(*number),
+        _ => None,
+    }
+}
+
+/// A structure that a client wrote, if it has this type.
+fn of_type<'a>(object: &'a ExtensionObject, info: &StructTypeInfo) -> Option<&'a DynamicStructure> {
+    let id = object.data_type()?;
+    let written = object.inner_as::<DynamicStructure>();
+    written.filter(|_| id.node_id == info.node_id)
 }
 
 /// Refuses a variable that would take too much memory: structures within structures multiply.

@@ -10,6 +10,7 @@ mod sampling;
 mod setup;
 mod space;
 mod standard;
+mod structure;
 mod units;
 mod verdict;
 mod visitor;

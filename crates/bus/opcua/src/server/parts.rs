@@ -174,6 +174,7 @@ fn whole(
             at,
         });
     }
-    content.close();
+    let places: Vec<&[usize]> = members.iter().map(|member| &member.at[..]).collect();
+    content.close(&places).map_err(cannot)?;
     Ok((members, content))
 }

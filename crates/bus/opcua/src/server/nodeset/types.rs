@@ -163,10 +163,11 @@ impl Types {
                 "no file of \"nodeset\" defines the members of its type {id}"
             ));
         };
-        if structure.structure_type != StructureType::Structure {
-            return Err(format!(
-                "the type {id} is a union, or has members that can be missing"
-            ));
+        use StructureType::{StructureWithSubtypedValues, UnionWithSubtypedValues};
+        if [StructureWithSubtypedValues, UnionWithSubtypedValues]
+            .contains(&structure.structure_type)
+        {
+            return Err(format!("the type {id} has members of an open type"));
         }
         if structure.default_encoding_id.is_null() {
             return Err(format!("the type {id} has no binary encoding"));

@@ -249,12 +249,12 @@ const OWN_NODES: &str = "namespaces = [\"http://opcfoundation.org/UA/DI/\", \"ht
 
 fn plc4x_at_own_places() -> Result<(), Absent> {
     let mut machine = open(
-        "kind = \"modbus-server\"\naddress = \"127.0.0.1:0\"\nat = { run = \"coil:65536\", speed = \"408502\", \
+        "kind = \"modbus-server\"\naddress = \"127.0.0.1:0\"\nat = { run = \"coil:65000\", speed = \"408502\", \
          torque = \"408503\", sensor = \"100008\", position = \"303202\", pressure = \"408510\" }",
     );
     let url = format!("modbus-tcp:tcp://{}", machine.address());
     let tags = Tags {
-        run: "coil:65536",
+        run: "coil:65000",
         speed: "holding-register:8502:INT",
         torque: "holding-register:8503:REAL",
         sensor: "discrete-input:8",

@@ -79,6 +79,10 @@ pub(crate) const TESTS: &[(&str, Test)] = &[
         structures::reach_every_member,
     ),
     (
+        "asyncua_meets_a_moulding_machine_of_euromap_77",
+        structures::make_a_moulding_machine,
+    ),
+    (
         "each_station_has_an_age_of_its_own_and_what_was_just_written_is_good",
         served::ages_apart,
     ),

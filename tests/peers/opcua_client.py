@@ -19,7 +19,7 @@ has a session, or "refused WHY", then obeys a line of JSON from stdin at a time,
     {"compare": file, "namespace": uri}  {"nodes", "differ": [texts]}: asyncua's own import of the file beside the server
     {"structure": node, "set": {member: value}}  {"value", "status"}: a structure as JSON, by the server's definitions;
                                      with "set" it is written with these members; {"of": name, member: value} is a
-                                     structure of that name
+                                     structure of that name, and a list of them is a whole array
     {"range": [node, range, type, values]}   {"status"} of a Write with an IndexRange; null values read: {"value"}
     {"stop": true}                   and at the end of stdin
 """
@@ -227,9 +227,12 @@ async def serve(client):
                 structures = True
             one = node(line["structure"])
             value = (await one.read_data_value(raise_on_bad_status=False)).Value.Value
-            if value is None:
+            if value is None and not isinstance(line.get("set"), list):
                 value = ua.extension_objects_by_datatype[await one.read_data_type()]()
-            for path, new in line.get("set", {}).items():
+            members = line.get("set", {})
+            if isinstance(members, list):
+                value, members = made(members), {}
+            for path, new in members.items():
                 *way, last = path.split(".")
                 inner = value
                 for name in way:
@@ -238,7 +241,7 @@ async def serve(client):
             if "set" in line:
                 wrote = await client.uaclient.write_attributes([one.nodeid], [ua.DataValue(value)])
                 answer["status"] = wrote[0].name
-            answer["value"] = dataclasses.asdict(value)
+            answer["value"] = list(map(dataclasses.asdict, value)) if isinstance(value, list) else dataclasses.asdict(value)
         if "range" in line:
             name, part, kind, values = line["range"]
             if values is None:

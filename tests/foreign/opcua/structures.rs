@@ -1,6 +1,7 @@
 //! asyncua and structures with arrays of structures, members that can be missing, and unions.
 
 use serde_json::{Value, json};
+use tickbus::signal::Slot;
 
 use super::device::{Device, Peer};
 use crate::harness::Absent;
@@ -19,10 +20,10 @@ const SIGNALS: &[(&str, &str, &str, &str)] = &[
     ("next real", "ns=2;i=6010.Real", "%QD12", "REAL"),
 ];
 
-fn sections() -> String {
-    let places = SIGNALS.iter();
+fn sections(signals: &[(&str, &str, &str, &str)]) -> String {
+    let places = signals.iter();
     let places = places.map(|(name, place, ..)| format!("\"{name}\" = \"{place}\"\n"));
-    let signals = SIGNALS.iter().map(|(name, _, address, of_type)| {
+    let signals = signals.iter().map(|(name, _, address, of_type)| {
         format!("[[signal]]\nname = \"{name}\"\naddress = \"{address}\"\ntype = \"{of_type}\"\n")
     });
     format!(
@@ -44,7 +45,7 @@ pub(super) fn reach_every_member() -> Result<(), Absent> {
         "address = \"127.0.0.1:0\"\nsecurity = \"None\"\nanonymous = true\ncycle = \"5ms\"\nnodeset = {model:?}\n"
     );
     let folder = tempfile::tempdir().expect("a folder");
-    let mut device = Device::open_with(folder, "opcua-server", &keys, &sections());
+    let mut device = Device::open_with(folder, "opcua-server", &keys, &sections(SIGNALS));
     let url = format!("opc.tcp://{}", device.address());
     let mut client = Peer::ready("opcua_client.py", &json!({"url": url}))?;
     for (signal, value) in [
@@ -127,5 +128,114 @@ pub(super) fn reach_every_member() -> Result<(), Absent> {
         (json!(3), point(1.0, 2.0))
     );
     assert_eq!(device.end.get("next real"), 6.5);
+    Ok(())
+}
+
+/// The signals of the machine in tests/peers/moulding.NodeSet2.xml.
+const MOULDING: &[(&str, &str, &str, &str)] = &[
+    (
+        "status",
+        "nsu=http://acme.example/moulding/;s=IMM.Job.Status",
+        "%ID0",
+        "DINT",
+    ),
+    (
+        "good",
+        "nsu=http://acme.example/moulding/;s=IMM.Job.Good",
+        "%IL8",
+        "ULINT",
+    ),
+    (
+        "cycle",
+        "nsu=http://acme.example/moulding/;s=IMM.Job.LastCycle",
+        "%IL16",
+        "LREAL",
+    ),
+    (
+        "p 0",
+        "nsu=http://acme.example/moulding/;s=IMM.Zone.PID[0].P",
+        "%QL0",
+        "LREAL",
+    ),
+    (
+        "d 1",
+        "nsu=http://acme.example/moulding/;s=IMM.Zone.PID[1].D",
+        "%QL8",
+        "LREAL",
+    ),
+];
+
+/// A machine of Euromap 77 by the public models, which no registry has: `UA_NODESETS` names a checkout of them.
+pub(super) fn make_a_moulding_machine() -> Result<(), Absent> {
+    let Some(models) = std::env::var_os("UA_NODESETS").map(std::path::PathBuf::from) else {
+        return Err(Absent(
+            "UA_NODESETS does not name a checkout of the OPC Foundation's UA-Nodeset".to_owned(),
+        ));
+    };
+    let files = [
+        "DI/Opc.Ua.Di.NodeSet2.xml",
+        "PlasticsRubber/GeneralTypes/1.03/Opc.Ua.PlasticsRubber.GeneralTypes.NodeSet2.xml",
+        "PlasticsRubber/IMM2MES/1.01/Opc.Ua.PlasticsRubber.IMM2MES.NodeSet2.xml",
+    ];
+    let mut files: Vec<_> = files.iter().map(|file| models.join(file)).collect();
+    let own = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/tests/peers/moulding.NodeSet2.xml"
+    );
+    files.push(own.into());
+    let keys = format!(
+        "address = \"127.0.0.1:0\"\nsecurity = \"None\"\nanonymous = true\ncycle = \"5ms\"\nnodeset = {files:?}\n"
+    );
+    let start = "\n[[signal]]\nname = \"start\"\naddress = \"%QX16.0\"\nlatch = \"rising\"\n";
+    let sections = sections(MOULDING).replacen(
+        "[[signal]]",
+        "\"start\" = \"nsu=http://acme.example/moulding/;s=IMM.Job.Start\"\n[[signal]]",
+        1,
+    );
+    let folder = tempfile::tempdir().expect("a folder");
+    let sections = format!("{sections}{start}");
+    let mut device = Device::open_with(folder, "opcua-server", &keys, &sections);
+    let url = format!("opc.tcp://{}", device.address());
+    let mut client = Peer::ready("opcua_client.py", &json!({"url": url}))?;
+    device.end.set("status", 6.0);
+    let good = MOULDING.iter().position(|(name, ..)| *name == "good");
+    device.end.slots[good.expect("a signal")] = Slot::from_unsigned(1234);
+    device.end.set("cycle", 18_500.0);
+    device.end.tick();
+    let names = client.ask(&json!({"names": true}));
+    let names = names["namespaces"].as_array().expect("a list");
+    let at = |uri: &str| {
+        names
+            .iter()
+            .position(|name| name == uri)
+            .expect("a namespace")
+    };
+    let (own, general) = (
+        at("http://acme.example/moulding/"),
+        at("http://opcfoundation.org/UA/PlasticsRubber/GeneralTypes/"),
+    );
+    let nodes = client.ask(&json!({"nodes": true}));
+    let zone = format!("ns={own};s=IMM.Zone.PID");
+    assert_eq!(nodes["nodes"][&zone], format!("{general}:PIDParameters"));
+    for (name, value) in [
+        ("Status", json!(6)),
+        ("Good", json!(1234)),
+        ("LastCycle", json!(18_500.0)),
+    ] {
+        let read = client.ask(&json!({"read": format!("ns={own};s=IMM.Job.{name}")}));
+        assert_eq!(read["value"], value, "{name}");
+    }
+    let pid = |p: f64, d: f64| json!({"of": "PIDParametersDataType", "P": p, "I": 0.0, "D": d});
+    let both = json!([pid(1.5, 0.0), pid(0.0, 2.5)]);
+    assert_eq!(write(&mut client, &zone, &both), "Good");
+    device.until("both members", |end| {
+        (end.get("p 0"), end.get("d 1")) == (1.5, 2.5)
+    });
+    let read = client.ask(&json!({"structure": zone}));
+    assert_eq!(read["value"][1], json!({"P": 0.0, "I": 0.0, "D": 2.5}));
+    let call =
+        json!({"call": [format!("ns={own};s=IMM.Job"), format!("ns={own};s=IMM.Job.Start")]});
+    assert_eq!(client.ask(&call)["status"], "Good");
+    device.until("the start", |end| end.get("start") == 1.0);
     Ok(())
 }

@@ -17,7 +17,7 @@ use conformance::peers::{leave, lying, own_address};
 use conformance::rig::{Bus, End, Liar, await_that, logged, pass, statistic};
 use tickbus_base::time::Manual;
 use tickbus_bus_opcua::{ClientOptions, ServerOptions};
-use tickbus_driver_cfg::{Kind, Kinds};
+use tickbus_driver_cfg::{Config, Kind, Kinds};
 
 /// The kinds of this crate.
 static KINDS: Kinds = Kinds::new(&[Kind::of::<ServerOptions>(), Kind::of::<ClientOptions>()]);
@@ -213,6 +213,52 @@ fn a_second_writer_is_counted_or_refused_until_the_first_one_has_left() {
             turn(&mut device, &mut [(&mut second, 100.0)]);
             has_speed(&device, 100.0)
         });
+    }
+}
+
+/// Lines of `[fieldbus.at]` that name no member of the variables in tests/peers/axes.NodeSet2.xml.
+#[test]
+fn a_line_that_names_no_single_value_is_told_what_there_is() {
+    let model = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../../tests/peers/axes.NodeSet2.xml"
+    );
+    for (places, part) in [
+        (&["6005.Points[2].X"][..], "the last element is [1]"),
+        (&["6005.Points[0].Z"], "the members are X, Y"),
+        (&["6005.Points"], "an array is not a single value"),
+        (&["6007.Place"], "a structure is not a single value"),
+        (
+            &["6009.Reel"],
+            "the members are Whole, Real, Place, SwitchField",
+        ),
+        (&["6009[0]"], "a structure has members"),
+        (
+            &["6009.Place.X", "6009.Real"],
+            "has one member at a time; give a signal to its .SwitchField, too",
+        ),
+        (&["6009.SwitchField"], "of type UInt32"),
+    ] {
+        let named = places.iter().enumerate();
+        let lines = named.map(|(at, place)| format!("\"s{at}\" = \"ns=2;i={place}\"\n"));
+        let signals = (0..places.len()).map(|at| {
+            format!(
+                "[[signal]]\nname = \"s{at}\"\naddress = \"%ID{}\"\ntype = \"REAL\"\n",
+                4 * at
+            )
+        });
+        let text = format!(
+            "[driver]\nid = 1\nname = \"axes\"\n[fieldbus]\nkind = \"opcua-server\"\naddress = \"127.0.0.1:0\"\n\
+             security = \"None\"\nanonymous = true\nnodeset = {model:?}\n[fieldbus.at]\n{}{}",
+            lines.collect::<String>(),
+            signals.collect::<String>()
+        );
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("driver.cfg");
+        std::fs::write(&file, text).expect("it is written");
+        let told = Config::load(&file, &KINDS).expect_err("a mistake");
+        let told = told.to_string();
+        assert!(told.contains(part), "{places:?}: {told}");
     }
 }
 

@@ -34,6 +34,16 @@ impl RealTime {
         self.lag
     }
 
+    /// Returns the simulation time that passes in a span of the clock; zero if nothing keeps it to the clock.
+    #[expect(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        reason = "exact for 100 days"
+    )]
+    pub fn span(&self, clock: Nanos) -> Nanos {
+        Nanos((clock.0 as f64 * self.pace) as i64)
+    }
+
     /// Returns how far simulation time has fallen behind the clock: the sum of all stalls of more than 100 ms.
     pub const fn lost(&self) -> Nanos {
         self.lost
@@ -88,5 +98,9 @@ mod tests {
         assert_eq!(twice.due(ms(80), ms(2510)), None);
         assert_eq!(twice.lost(), ms(975 + 500));
         assert_eq!(RealTime::new(0.0).due(ms(70), ms(0)), None);
+        assert_eq!(
+            (twice.span(ms(5)), RealTime::new(0.0).span(ms(5))),
+            (ms(10), Nanos::ZERO)
+        );
     }
 }

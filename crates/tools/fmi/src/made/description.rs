@@ -8,15 +8,12 @@ use std::fmt::Write as _;
 
 use quick_xml::escape::escape;
 
-use tickbus_base::time::Nanos;
 use tickbus_driver_cfg::Config;
 
 use super::exposed::Exposed;
-use super::variables::{Enumeration, Start, Use, Variable};
+use super::own::cycle;
+use super::variables::{Enumeration, Start, Use, Variable, seconds};
 use crate::value::{Value, ValueType, Version};
-
-/// The proposed step if the driver.cfg names no cycle.
-const STEP: Nanos = Nanos::from_millis(10);
 
 /// The length of the proposed run, in seconds.
 const STOP: u32 = 10;
@@ -80,9 +77,7 @@ pub fn model_description(config: &Config, version: Version, token: &str) -> Stri
         );
     }
     text.push_str("  </LogCategories>\n");
-    let step = config.timing.cycle.or(config.bus.cycle()).unwrap_or(STEP);
-    #[expect(clippy::cast_precision_loss, reason = "a cycle is short")]
-    let step = step.0 as f64 / 1e9;
+    let step = seconds(cycle(config));
     let _ = writeln!(
         text,
         "  <DefaultExperiment startTime=\"0\" stopTime=\"{STOP}\" stepSize=\"{step}\"/>"

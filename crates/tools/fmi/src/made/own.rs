@@ -2,6 +2,7 @@
 
 use std::ops::DerefMut as _;
 
+use tickbus_base::time::Nanos;
 use tickbus_driver::Exchange;
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::LinkState;
@@ -177,6 +178,12 @@ fn has_address(config: &Config) -> bool {
 /// Returns true if the bus runs in the steps of the simulation.
 pub fn is_stepped(config: &Config) -> bool {
     config.bus.is_stepped()
+}
+
+/// Returns the time between two bus cycles, which is the proposed step: 10 ms if neither driver.cfg nor the bus knows it.
+pub(super) fn cycle(config: &Config) -> Nanos {
+    let cycle = config.timing.cycle.or(config.bus.cycle());
+    cycle.unwrap_or(Nanos::from_millis(10))
 }
 
 /// Returns the default pace. A free-running bus is a PLC in real time: a simulation that runs faster would see only a

@@ -13,9 +13,13 @@ const TEXT: &str = "[driver]\nid = 1\nname = \"It\"\n[fieldbus]\nkind = \"loopba
     fail_safe = 7\n[[signal]]\nname = \"on\"\naddress = \"%IX4.0\"\n";
 
 fn instance(version: Version, event_mode: EventMode) -> (TempDir, Instance) {
+    instance_of(TEXT, version, event_mode)
+}
+
+fn instance_of(text: &str, version: Version, event_mode: EventMode) -> (TempDir, Instance) {
     let folder = tempfile::tempdir().expect("a folder");
-    std::fs::write(folder.path().join("driver.cfg"), TEXT).expect("a file");
-    let made = Instance::new(version, folder.path(), &token(TEXT.as_bytes()), &KINDS);
+    std::fs::write(folder.path().join("driver.cfg"), text).expect("a file");
+    let made = Instance::new(version, folder.path(), &token(text.as_bytes()), &KINDS);
     let mut instance = made.unwrap_or_else(|why| panic!("{why}"));
     instance.set_event_mode(event_mode);
     (folder, instance)
@@ -97,6 +101,26 @@ fn a_step_ends_at_the_bus_cycle_where_the_importer_allows_it() {
     assert_eq!(instance.step(0.0, 0.05), Ok(EVENT));
     assert_eq!(instance.step(0.05, 0.05), Ok(EVENT));
     assert_eq!(instance.step(0.1, 0.004), Ok(QUIET));
+}
+
+#[test]
+fn a_step_on_a_free_bus_ends_early_only_if_steps_keep_to_the_clock() {
+    let text = TEXT.replace("stepped", "free");
+    for (pace, early) in [(1.0, true), (0.0, false)] {
+        let (_folder, mut instance) = instance_of(&text, Version::Three, EARLY);
+        assert_eq!(instance.setup(0.0, None), Ok(()));
+        assert_eq!(instance.enter_initialization(), Ok(()));
+        let set = instance.set(&[Place::Pace.reference()], [pace].into_iter());
+        assert_eq!(set, Ok(()));
+        assert_eq!(instance.open(), Ok(()));
+        assert_eq!(instance.leave_events(), Ok(()));
+        // The program on its own thread answers long before a minute is over.
+        let end = instance.step(0.0, 60.0).expect("it is done");
+        assert_eq!(end.early, early);
+        assert!(end.event || !early);
+        assert_eq!(instance.time() < 60.0, early, "{}", instance.time());
+        assert_eq!(instance.terminate(), Ok(()));
+    }
 }
 
 #[test]

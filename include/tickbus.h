@@ -212,8 +212,8 @@ TB_IMPORT int32_t tb_faults(tb_driver driver, char *text, size_t room);
  * forcing signals: pass it on with care. Returns as tb_statistics does. */
 TB_IMPORT int32_t tb_page(tb_driver driver, char *text, size_t room);
 
-/* Whether the bus has ended the run on its own, as virtual time does: further ticks bring stale values. Returns 1 from then on,
- * before that 0, or a status below 0, as for a driver that is closed. */
+/* Returns 1 once the bus has ended the run on its own, as virtual time does: further ticks bring stale values. Returns 0 before
+ * that, or a status below 0. */
 TB_IMPORT int32_t tb_is_over(tb_driver driver);
 
 /* Paces a loop by the computer's clock: waits until the next turn is due, one in each `period` (nanoseconds, above 0), and

@@ -42,9 +42,9 @@ enum Phase {
 /// How the importing tool uses the event mode of FMI 3.0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EventMode {
-    /// It does not.
+    /// The tool does not use the event mode.
     Unused,
-    /// It asks for events after a step.
+    /// The tool asks for events after a step.
     Used {
         /// True if a step can end at an event.
         early_return: bool,

@@ -399,9 +399,9 @@ public final class Tickbus implements AutoCloseable {
     }
 
     /**
-     * Whether the bus has ended the run on its own, as virtual time does: further ticks bring stale values.
+     * Returns true once the bus has ended the run on its own, as virtual time does. Further ticks bring stale values.
      *
-     * @return true from then on
+     * @return false while the run can continue
      */
     public boolean isOver() {
         return overNative(handle);

@@ -70,7 +70,7 @@ while not is_over:
     ended = time.monotonic_ns()
     simulated += period / 1e9
     (age,) = slave.getFloat64([references["bus.age"]])
-    (status,), (sequence,) = slave.getInt32([references["bus.status"]]), slave.getUInt64([references["bus.sequence"]])
+    (status,), (sequence,) = slave.getInt64([references["bus.status"]]), slave.getUInt64([references["bus.sequence"]])
     line = [tick, began, ended, ended, status, round(age * 1e9), sequence]
     columns = [slave.getUInt64(read["stamp"]), slave.getBoolean(read["level"]), slave.getUInt32(edges)]
     columns += [slave.getInt16(read["whole"]), slave.getFloat64(read["real"])]

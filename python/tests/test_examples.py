@@ -116,3 +116,19 @@ def test_the_tanks_of_gymnasium_are_refilled_by_their_plcs(tmp_path):
     assert int(first["episodes"]) == 64
     assert run() == first
     assert run("--seed", "2") != first
+
+
+def test_the_machine_that_tickbus_new_writes_meets_its_plc(tmp_path: Path) -> None:
+    """The PLC opens the valve, because the level is low at first."""
+    command = root("target", "release", "tickbus")
+    if not command.exists():
+        pytest.skip("there is no target/release/tickbus")
+    new = [command, "new", tmp_path / "m", "--plc", "none", "--simulator", "python"]
+    subprocess.run(new, check=True, stdout=subprocess.DEVNULL)
+    machine = subprocess.Popen([sys.executable, "machine.py"], cwd=tmp_path / "m", stdout=subprocess.PIPE, text=True)
+    try:
+        assert machine.stdout is not None
+        assert any("valve True" in line for line in machine.stdout)
+    finally:
+        machine.kill()
+        machine.wait()

@@ -29,6 +29,7 @@ mod latency;
 mod logo;
 mod man;
 mod mirror;
+mod new;
 mod observe;
 mod play;
 mod plc;
@@ -82,6 +83,7 @@ enum Command {
     Logo(logo::Arguments),
     Man(man::Arguments),
     Mirror(mirror::Arguments),
+    New(new::Arguments),
     Observe(observe::Arguments),
     Play(play::Arguments),
     Plc(plc::Arguments),
@@ -166,6 +168,7 @@ fn run(kinds: &'static Kinds) -> Outcome {
         Command::Logo(arguments) => logo::run(&arguments),
         Command::Man(arguments) => man::run(&arguments),
         Command::Mirror(arguments) => mirror::run(&arguments, kinds),
+        Command::New(arguments) => new::run(&arguments, kinds),
         Command::Observe(arguments) => observe::run(&arguments, kinds),
         Command::Play(arguments) => play::run(&arguments, kinds),
         Command::Plc(arguments) => plc::run(&arguments, kinds),

@@ -40,7 +40,7 @@ scale   = { raw = [0, 27648], value = [0.0, 500.0] }
 "#;
 
 /// The folder of the native library that this test is built with.
-fn library() -> PathBuf {
+pub(crate) fn library() -> PathBuf {
     let here = std::env::current_exe().expect("a test has a file");
     here.parent().expect("it is in a folder").to_owned()
 }

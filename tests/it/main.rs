@@ -21,6 +21,7 @@ mod import;
 mod installed;
 mod logo;
 mod loopback;
+mod new;
 mod observer;
 mod own_program;
 mod peeler;

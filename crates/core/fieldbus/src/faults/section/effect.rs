@@ -50,13 +50,23 @@ pub(super) fn read_effect(
             read_code(keys.code.as_ref()?, codes).map(AnswerTrouble::Error)
         }),
         "answer-wrong" => read_answer(keys, scope, |codes| {
-            let known = WrongAnswer::NAMES;
-            let known = known.iter().filter(|(_, how)| codes.wrong.contains(how));
-            let known: Vec<_> = known.copied().collect();
-            if known.is_empty() {
+            let (value, names) = (keys.how.as_ref()?, &WrongAnswer::NAMES);
+            let how = value.choice("faults of answers", names)?;
+            if !codes.wrong.contains(&how) {
+                let known = names.iter().filter(|(_, how)| codes.wrong.contains(how));
+                let known: Vec<_> = known.map(|(name, _)| format!("\"{name}\"")).collect();
+                // A bus without any was reported with the kind.
+                if !known.is_empty() {
+                    value.wrong(
+                        format!(
+                            "answers of this bus cannot be \"{}\"",
+                            value.as_text().unwrap_or_default()
+                        ),
+                        format!("write {}", known.join(" or ")),
+                    );
+                }
                 return None;
             }
-            let how = keys.how.as_ref()?.choice("faults of answers", &known)?;
             Some(AnswerTrouble::Wrong(how))
         }),
         "link-down" => line(LineEffect::LinkDown),

@@ -34,10 +34,9 @@ pub struct Identification {
     /// Vendor's name, product code, major and minor revision; then vendor's URL, names of product, model and
     /// application, which do not exist if empty.
     pub objects: [String; OBJECTS],
-    /// The answer to function 17, before the run indicator; `None` if the device does not have that function.
-    pub server_id: Option<String>,
-    /// The additional data of function 17, behind the run indicator.
-    pub server_data: String,
+    /// The answer to function 17: server id, run indicator and additional data; `None` if the device does not have that
+    /// function.
+    pub server_id: Option<Vec<u8>>,
 }
 
 impl Identification {
@@ -52,7 +51,6 @@ impl Identification {
         Self {
             objects,
             server_id: None,
-            server_data: String::new(),
         }
     }
 
@@ -74,18 +72,12 @@ impl Identification {
         data: &[u8],
         reply: &mut Vec<u8>,
     ) -> Result<(), Exception> {
-        const RUNS: u8 = 0xFF;
         let id = self.server_id.as_ref().ok_or(Exception::ILLEGAL_FUNCTION)?;
         if !data.is_empty() {
             return Err(Exception::ILLEGAL_DATA_VALUE);
         }
-        let id = &id.as_bytes()[..id.len().min(TEXT_LIMIT)];
-        let data = self.server_data.as_bytes();
-        let data = &data[..data.len().min(TEXT_LIMIT - id.len())];
-        reply.push(u8::try_from(id.len() + 1 + data.len()).expect("shorter than a PDU"));
+        reply.push(u8::try_from(id.len()).expect("shorter than a PDU"));
         reply.extend_from_slice(id);
-        reply.push(RUNS);
-        reply.extend_from_slice(data);
         Ok(())
     }
 

@@ -1,11 +1,14 @@
 //! `[fieldbus.identity]`: how the device names itself.
 
-use crate::Identification;
 use crate::identification::{OBJECTS, TEXT_LIMIT};
+use crate::{Identification, PDU_LIMIT};
 use tickbus_base::toml_text::{Key, Shape, Value};
 
 /// The shape of a text in an answer.
 const TEXT: Shape = Shape::Label(TEXT_LIMIT);
+
+/// The run indicator of function 17 (Modbus Application Protocol V1.1b3, 6.13): the device runs.
+const RUNS: u8 = 0xFF;
 
 /// The keys: the objects of function 43/14 in the order of their numbers, then function 17.
 pub(crate) const IDENTITY_KEYS: &[Key] = &[
@@ -70,9 +73,15 @@ pub(crate) fn read_identity(value: &Value<'_>) -> Option<Identification> {
         );
         return None;
     }
-    all_right.then_some(Identification {
-        objects,
-        server_id,
-        server_data: server_data.unwrap_or_default(),
-    })
+    let data = server_data.unwrap_or_default();
+    let server_id = server_id.map(|id| [id.as_bytes(), &[RUNS], data.as_bytes()].concat());
+    let length = server_id.as_ref().map_or(0, Vec::len);
+    if length > PDU_LIMIT - 2 {
+        value.wrong(
+            format!("the answer to function 17 has {length} characters"),
+            format!("shorten server_id or server_data: {} fit", PDU_LIMIT - 2),
+        );
+        return None;
+    }
+    all_right.then_some(Identification { objects, server_id })
 }

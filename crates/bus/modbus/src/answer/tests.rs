@@ -293,8 +293,7 @@ fn a_device_has_the_names_that_its_maker_gave_it() {
     let names = ["ACME", "FD-7", "V2.1", "", "Frequency drive", "", "Line 3"].map(str::to_owned);
     let who = Identification {
         objects: names,
-        server_id: Some("FD7".to_owned()),
-        server_data: String::new(),
+        server_id: Some(b"FD7\xFF".to_vec()),
     };
     let ask = |pdu: &[u8]| {
         let map = map(Side::Sends, None);

@@ -247,7 +247,10 @@ fn answered(answer: AnswerEffect, table: &SignalTable) -> String {
         format!(" of the station \"{}\"", table.stations[station].name)
     });
     let Elements { signal, quantity } = answer.elements;
-    let quantity = quantity.map_or_else(String::new, |number| format!(" for {number} elements"));
+    let quantity = quantity.map_or_else(String::new, |number| match number {
+        1 => " for one element".to_owned(),
+        _ => format!(" for {number} elements"),
+    });
     let signal = signal.map_or_else(String::new, |signal| {
         format!(" that concern \"{}\"", table.signals[signal].name)
     });

@@ -26,6 +26,12 @@ const BARE: [NodeId; 2] = [
     },
 ];
 
+/// The structures with members whose type a value states, which async-opcua 0.19 neither reads nor writes.
+const OPEN: [StructureType; 2] = [
+    StructureType::StructureWithSubtypedValues,
+    StructureType::UnionWithSubtypedValues,
+];
+
 /// The deepest nesting of structures whose members can be signals.
 const DEEPEST: usize = 16;
 
@@ -163,10 +169,7 @@ impl Types {
                 "no file of \"nodeset\" defines the members of its type {id}"
             ));
         };
-        use StructureType::{StructureWithSubtypedValues, UnionWithSubtypedValues};
-        if [StructureWithSubtypedValues, UnionWithSubtypedValues]
-            .contains(&structure.structure_type)
-        {
+        if OPEN.contains(&structure.structure_type) {
             return Err(format!("the type {id} has members of an open type"));
         }
         if structure.default_encoding_id.is_null() {

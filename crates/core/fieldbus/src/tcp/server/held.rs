@@ -49,7 +49,7 @@ impl Held {
                 answer,
                 stations: self.stations.clone(),
             };
-            due = due + pause;
+            due += pause;
             piece
         })
     }

@@ -1,5 +1,6 @@
 //! The effect of commands on an axis: one simulated drive, stepped through time.
 
+use super::ramp::{Place, ramped};
 use super::{AxisKind, Limits, Motion, Profile};
 
 /// The tolerance within which a target counts as reached, in the unit of the axis.
@@ -234,24 +235,19 @@ impl Drive {
             }
             Doing::Chase { target } => {
                 let target = *target;
-                let way = target - self.position;
-                let brake = self.motion.deceleration.abs();
-                // The highest speed from which the axis can still stop at the target.
-                let safe = (2.0 * brake * way.abs())
-                    .sqrt()
-                    .min(self.motion.speed.abs());
-                self.ramp(safe.copysign(way), seconds);
-                let moved = self.speed * seconds;
-                if moved * way >= 0.0 && moved.abs() >= way.abs() {
-                    self.position = target;
+                let mut place = Place {
+                    position: self.position,
+                    speed: self.speed,
+                };
+                let is_there = place.chase(target, self.motion.speed, self.rates(), seconds);
+                (self.position, self.speed) = (place.position, place.speed);
+                if is_there {
                     self.arrive();
-                } else {
-                    self.position += moved;
                 }
             }
             Doing::Run { speed } => {
                 let speed = *speed;
-                self.ramp(speed, seconds);
+                self.speed = ramped(self.speed, speed, self.rates(), seconds);
                 self.position += self.speed * seconds;
                 if speed == 0.0 && self.speed == 0.0 {
                     self.arrive();
@@ -279,21 +275,9 @@ impl Drive {
         }
     }
 
-    /// Changes the speed towards `wanted` as fast as the command allows.
-    fn ramp(&mut self, wanted: f64, seconds: f64) {
-        let faster = wanted.abs() > self.speed.abs() && wanted * self.speed >= 0.0;
-        let rate = if faster {
-            self.motion.acceleration
-        } else {
-            self.motion.deceleration
-        };
-        // A command without a rate, as possible with tracking, changes the speed at once.
-        let most = if rate.abs() > 0.0 {
-            rate.abs() * seconds
-        } else {
-            f64::INFINITY
-        };
-        self.speed += (wanted - self.speed).clamp(-most, most);
+    /// The rates of the command. One without a rate, as possible with tracking, changes the speed at once.
+    fn rates(&self) -> [f64; 2] {
+        [self.motion.acceleration, self.motion.deceleration]
     }
 
     fn arrive(&mut self) {

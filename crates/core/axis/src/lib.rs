@@ -3,12 +3,14 @@
 //! An `[[axis]]` table of a driver.cfg expands into about fifteen signals, whose addresses [`Field`] has. [`Reflexes`]
 //! does the routine work of a machine on every tick: acknowledging commands, looking them up by number, end switches.
 //! [`Profile`] and [`Drive`] are the motion itself: the course of a move over time, and the effect of commands on an
-//! axis.
+//! axis. [`profidrive`] is a drive behind a telegram of PROFIdrive, which a `[[drive]]` table describes.
 
 mod command;
 mod drive;
 mod field;
+pub mod profidrive;
 mod profile;
+mod ramp;
 mod reflexes;
 pub mod section;
 

@@ -1,6 +1,7 @@
-//! The `[[axis]]` sections of a driver.cfg: each expands into signals.
+//! The `[[axis]]` and `[[drive]]` sections of a driver.cfg: each expands into signals.
 
 mod commands;
+pub mod drives;
 mod switches;
 
 use std::collections::HashMap;
@@ -97,7 +98,7 @@ pub const KEYS: &[Key] = &[
     ),
 ];
 
-/// The bytes that the preceding axis tables occupy.
+/// The bytes that the preceding tables of axes and drives occupy.
 #[derive(Debug, Default)]
 pub struct OffsetAllocator<'a> {
     /// By name of the station: the first free bytes of `%Q` and of `%I`.
@@ -105,20 +106,21 @@ pub struct OffsetAllocator<'a> {
 }
 
 impl<'a> OffsetAllocator<'a> {
-    /// Allocates the two structures of an axis: at the offsets of its table, or right after the preceding axis.
+    /// Allocates the two structures of an axis or a drive: at the offsets of its table, or right after the preceding
+    /// one.
     fn take(
         &mut self,
         station: Option<&Value<'a>>,
         offsets: &[Option<Value<'a>>; 2],
-        feedback_bytes: usize,
+        bytes: [usize; 2],
     ) -> (Option<usize>, Option<usize>) {
         let key = station.and_then(Value::as_text).unwrap_or("");
         let free = self.free.entry(key).or_default();
-        let command = offset_of(offsets[0].as_ref(), free.0, COMMAND_BYTES);
-        let feedback = offset_of(offsets[1].as_ref(), free.1, feedback_bytes);
+        let command = offset_of(offsets[0].as_ref(), free.0, bytes[0]);
+        let feedback = offset_of(offsets[1].as_ref(), free.1, bytes[1]);
         *free = (
-            command.unwrap_or(free.0) + COMMAND_BYTES,
-            feedback.unwrap_or(free.1) + feedback_bytes,
+            command.unwrap_or(free.0) + bytes[0],
+            feedback.unwrap_or(free.1) + bytes[1],
         );
         (command, feedback)
     }
@@ -201,7 +203,7 @@ pub fn read<'a>(
     let named = name
         .as_ref()
         .and_then(|value| name_of(value).map(|name| (name, value)))
-        .filter(|(name, value)| is_short(name, value));
+        .filter(|(name, value)| is_short("axis", name, value));
     let kind = kind.map_or(Some(AxisKind::Position), |value| {
         value.choice("kinds of axes", &AxisKind::ALL)
     });
@@ -230,13 +232,14 @@ pub fn read<'a>(
     } else {
         FEEDBACK_BYTES
     };
-    let (command, feedback) = places.take(station.as_ref(), &offsets, feedback_bytes);
+    let bytes = [COMMAND_BYTES, feedback_bytes];
+    let (command, feedback) = places.take(station.as_ref(), &offsets, bytes);
     let (command, feedback) = (command?, feedback?);
     let ((name, value), kind) = (named?, kind?);
     let end = (command + COMMAND_BYTES).max(feedback + feedback_bytes);
     let judged = whole && !matches!(scaled, Some(None));
     let may_invert = mirrored.is_some_and(|(inverted, _)| inverted != Some(false));
-    if !judged || (may_invert && bounds.is_none()) || !fits(end, name, value) {
+    if !judged || (may_invert && bounds.is_none()) || !fits("axis", end, name, value) {
         return None;
     }
     let axis = Axis {
@@ -268,14 +271,17 @@ pub fn read<'a>(
     let fields = Field::ALL.into_iter().filter(|field| has(*field));
     let signals = fields.map(|field| signal(&axis, field, scales, band.flatten()));
     let structures = Structures {
+        kind: "axis",
         name: value,
         offsets: &offsets,
         station: station.as_ref(),
         number,
+        ends: [
+            axis.command + COMMAND_BYTES,
+            axis.feedback + axis.feedback_bytes,
+        ],
     };
-    let mut sections: Vec<Section<'a>> = signals
-        .map(|signal| structures.section(&axis, signal))
-        .collect();
+    let mut sections: Vec<Section<'a>> = signals.map(|signal| structures.section(signal)).collect();
     for (_, mut section) in switches {
         section.station.clone_from(&station);
         sections.push(section);
@@ -283,41 +289,43 @@ pub fn read<'a>(
     Some(Read { axis, sections })
 }
 
-/// The data shared by the sections of all fields of one axis.
+/// The data shared by the sections of all signals of one axis or drive.
 struct Structures<'t, 'a> {
+    /// What the table describes, in messages.
+    kind: &'static str,
     name: &'t Value<'a>,
     /// The values of `command_offset` and `feedback_offset`.
     offsets: &'t [Option<Value<'a>>; 2],
     station: Option<&'t Value<'a>>,
     number: usize,
+    /// Offsets just beyond the command and the feedback.
+    ends: [usize; 2],
 }
 
 impl<'a> Structures<'_, 'a> {
-    fn section(&self, axis: &Axis, signal: Signal) -> Section<'a> {
-        let (offset, end) = match signal.area {
-            Area::Output => (&self.offsets[0], axis.command + COMMAND_BYTES),
-            Area::Input => (&self.offsets[1], axis.feedback + axis.feedback_bytes),
-        };
+    fn section(&self, signal: Signal) -> Section<'a> {
+        let place = usize::from(signal.area == Area::Input);
         Section {
             name: Some(self.name.clone()),
-            address: offset.as_ref().unwrap_or(self.name).clone(),
+            address: self.offsets[place].as_ref().unwrap_or(self.name).clone(),
             station: self.station.cloned(),
             structure: Some(Structure {
+                kind: self.kind,
                 table: self.number,
-                end,
+                end: self.ends[place],
             }),
             signal,
         }
     }
 }
 
-fn is_short(name: &str, value: &Value<'_>) -> bool {
+fn is_short(kind: &str, name: &str, value: &Value<'_>) -> bool {
     let most = NAME_LIMIT - FIELD_NAME;
     let short = name.chars().nth(most).is_none();
     if !short {
         value.wrong(
             format!(
-                "the axis' name is longer than {most} characters: \"{}\"",
+                "the name of the {kind} is longer than {most} characters: \"{}\"",
                 shown(name)
             ),
             "shorten it; the names of its signals begin with it",
@@ -327,10 +335,10 @@ fn is_short(name: &str, value: &Value<'_>) -> bool {
 }
 
 /// True if a structure that ends at `end` fits into its area.
-fn fits(end: usize, name: &str, value: &Value<'_>) -> bool {
+fn fits(kind: &str, end: usize, name: &str, value: &Value<'_>) -> bool {
     if end > AREA_LIMIT {
         value.wrong(
-            format!("the axis \"{}\" ends at byte {}", shown(name), end - 1),
+            format!("the {kind} \"{}\" ends at byte {}", shown(name), end - 1),
             format!("an area has at most {AREA_LIMIT} bytes; use several stations"),
         );
     }

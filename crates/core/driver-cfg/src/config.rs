@@ -16,7 +16,7 @@ use tickbus_fieldbus::faults::{self, Fault};
 use tickbus_fieldbus::{At, Events, LifeSigns, Role, Written};
 use tickbus_image::signal::{Addressing, Area, SignalTable, Station};
 use tickbus_record as record;
-use tickbus_reply::{self as reply, Reply};
+use tickbus_reply::{self as reply, Drive, Reply};
 
 /// The checked contents of a driver.cfg.
 #[derive(Clone, Debug, PartialEq)]
@@ -200,6 +200,7 @@ fn read(path: &Path, mut root: Table<'_>, given: Given) -> Option<Config> {
     let stations = root.take("station");
     let signals = root.take("signal");
     let axes = root.take("axis");
+    let drives = root.take("drive");
     let replies = root.take("reply");
     let faults = root.take("fault");
     let record = root.take("record");
@@ -235,6 +236,9 @@ fn read(path: &Path, mut root: Table<'_>, given: Given) -> Option<Config> {
     let axes = axes
         .map(|value| value.tables("[[axis]]"))
         .unwrap_or_default();
+    let drives = drives
+        .map(|value| value.tables("[[drive]]"))
+        .unwrap_or_default();
     if is_observers {
         for table in declared.iter().flatten() {
             observer::refuse_keys(table, observer::OF_LINE);
@@ -246,6 +250,7 @@ fn read(path: &Path, mut root: Table<'_>, given: Given) -> Option<Config> {
     for (tables, limit, what) in [
         (&signals, layout::SIGNAL_LIMIT, "signals"),
         (&axes, layout::AXIS_LIMIT, "axes"),
+        (&drives, layout::DRIVE_LIMIT, "drives"),
     ] {
         if let Some(table) = tables.get(limit) {
             table.wrong(
@@ -258,7 +263,8 @@ fn read(path: &Path, mut root: Table<'_>, given: Given) -> Option<Config> {
     }
     layout::check_twins(&signals, "signal");
     layout::check_twins(&axes, "axis");
-    let (mut axes, sections) = layout::read_signals(signals, axes, addressing);
+    layout::check_twins(&drives, "drive");
+    let (mut axes, drives, sections) = layout::read_signals(signals, axes, drives, addressing);
     let sizes = fieldbus
         .as_ref()
         .map(|fieldbus| fieldbus.sizes.clone())
@@ -313,7 +319,7 @@ fn read(path: &Path, mut root: Table<'_>, given: Given) -> Option<Config> {
     let replies = match &table {
         // All signals of an observer are received.
         Some(_) if observes => Vec::new(),
-        Some(table) => read_replies(replies, table, &axes, &life_signs),
+        Some(table) => read_replies(replies, &drives, table, &axes, &life_signs),
         None => Vec::new(),
     };
     let bus = fieldbus.as_ref().and_then(|fieldbus| fieldbus.bus.as_ref());
@@ -375,20 +381,32 @@ fn read(path: &Path, mut root: Table<'_>, given: Given) -> Option<Config> {
     })
 }
 
-/// Reads the replies of a machine, whose other signals of the driver's own they must not make.
+/// Reads the replies of a machine, whose other signals of the driver's own they must not make; its drives are replies,
+/// too.
 fn read_replies(
     sections: Vec<Table<'_>>,
+    drives: &[Drive<'_>],
     table: &SignalTable,
     axes: &[Axis],
     life_signs: &LifeSigns,
 ) -> Vec<Reply> {
-    let taken = taken_signals(table, axes, life_signs);
+    let mut taken = taken_signals(table, axes, life_signs);
     let scope = reply::Scope {
         table,
         writes: Area::Input,
         tick: None,
-        taken: &taken,
+        taken: &[],
         earlier: &[],
+    };
+    let earlier = reply::drives(drives, scope);
+    for drive in &earlier {
+        let what = format!("the drive \"{}\"", shown(&drive.name));
+        taken.extend(drive.outputs.iter().map(|own| (*own, what.clone())));
+    }
+    let scope = reply::Scope {
+        taken: &taken,
+        earlier: &earlier,
+        ..scope
     };
     reply::read_sections(sections, scope)
 }

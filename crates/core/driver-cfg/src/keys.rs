@@ -66,6 +66,15 @@ pub const FILE: &[Key] = &[
         "Drives of the machine, each as some fifteen signals",
     ),
     Key::new(
+        "drive",
+        Shape::List(
+            &Shape::Table(axis::section::drives::KEYS),
+            0,
+            layout::DRIVE_LIMIT,
+        ),
+        "Drives on a telegram of PROFIdrive",
+    ),
+    Key::new(
         "reply",
         Shape::List(&Shape::Table(reply::REPLY_KEYS), 0, reply::LIMIT),
         "Signals that the driver makes where no model does",

@@ -9,12 +9,16 @@ use tickbus_axis::Axis;
 use tickbus_base::toml_text::{Key, Shape, Table, Value, did_you_mean, shown};
 use tickbus_image::signal::section::{self, NAME_LIMIT, STATION, Section};
 use tickbus_image::signal::{AREA_LIMIT, Addressing, Area, SignalTable, Station};
+use tickbus_reply::Drive;
 
 /// The most signals of one driver.
 pub(super) const SIGNAL_LIMIT: usize = 100_000;
 
 /// The most axes of one driver; each has about fifteen signals.
 pub(super) const AXIS_LIMIT: usize = 2_000;
+
+/// The most drives of one driver; each has up to twenty signals.
+pub(super) const DRIVE_LIMIT: usize = 1_000;
 
 /// The most stations of one driver.
 pub const STATION_LIMIT: usize = 256;
@@ -63,12 +67,13 @@ struct Declared<'a> {
     sizes: Sizes<'a>,
 }
 
-/// Reads the `[[signal]]` and `[[axis]]` tables; signals are in the order of the file.
+/// Reads the `[[signal]]`, `[[axis]]` and `[[drive]]` tables; signals are in the order of the file.
 pub(super) fn read_signals<'a>(
     signals: Vec<Table<'a>>,
     axes: Vec<Table<'a>>,
+    drives: Vec<Table<'a>>,
     addressing: Addressing,
-) -> (Vec<Axis>, Vec<Section<'a>>) {
+) -> (Vec<Axis>, Vec<Drive<'a>>, Vec<Section<'a>>) {
     let mut all = Vec::new();
     for table in signals {
         let at = table.at();
@@ -76,6 +81,7 @@ pub(super) fn read_signals<'a>(
     }
     let mut read = Vec::new();
     let mut places = axis::section::OffsetAllocator::default();
+    let count = axes.len();
     for (number, table) in axes.into_iter().enumerate() {
         let at = table.at();
         if let Some(axis) = axis::section::read(table, number, addressing, &mut places) {
@@ -83,9 +89,22 @@ pub(super) fn read_signals<'a>(
             all.extend(axis.sections.into_iter().map(|section| (at, section)));
         }
     }
+    let mut driven = Vec::new();
+    for (number, table) in drives.into_iter().enumerate() {
+        let at = table.at();
+        if let Some(read) = axis::section::drives::read(table, count + number, &mut places) {
+            driven.push(Drive {
+                name: read.name,
+                setup: read.setup,
+                conditions: read.conditions,
+            });
+            all.extend(read.sections.into_iter().map(|section| (at, section)));
+        }
+    }
     // A stable sort, so that the signals of one axis stay in order.
     all.sort_by_key(|(at, _)| *at);
-    (read, all.into_iter().map(|(_, section)| section).collect())
+    let sections = all.into_iter().map(|(_, section)| section).collect();
+    (read, driven, sections)
 }
 
 /// Assigns the signals, those of `axes` among them, to their stations and reports conflicts.
@@ -285,7 +304,7 @@ pub(super) fn check_twins(tables: &[Table<'_>], what: &str) {
     }
 }
 
-/// Reports signals that have the name of an edge count or of an axis signal.
+/// Reports signals that have the name of an edge count, or of a signal of an axis or a drive.
 fn check_names(sections: &[Section<'_>]) {
     let mut first: HashMap<&str, &Section<'_>> = HashMap::new();
     for section in sections {
@@ -302,8 +321,9 @@ fn check_names(sections: &[Section<'_>]) {
         if let (Some(name), true, false) = (&wrong.name, wrong.has_own_name(), twins) {
             name.wrong(
                 format!(
-                    "the name \"{}\" is that of a signal of an axis, on line {}",
+                    "the name \"{}\" is that of a signal of {} on line {}",
                     shown(&section.signal.name),
+                    other.title(),
                     line_of(other),
                 ),
                 "choose another",

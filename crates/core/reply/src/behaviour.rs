@@ -7,6 +7,7 @@ use tickbus_base::toml_text::shown;
 use tickbus_image::signal::{SignalTable, Slot};
 
 use super::delay::Follows;
+use super::drive::Driven;
 use super::io::Io;
 use super::lag::Lag;
 use super::motor::Motor;
@@ -19,12 +20,12 @@ use super::travel::Travel;
 /// The kind whose replies are rules.
 pub(crate) const RULE: &str = "rule";
 
-/// One `[[reply]]` of a driver.cfg, or `[[machine.reply]]` of a test file, at its beginning.
+/// One `[[reply]]` or `[[drive]]` of a driver.cfg, or `[[machine.reply]]` of a test file, at its beginning.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reply {
     /// The name, for messages.
     pub name: String,
-    /// The kind, one of [`REPLY_KINDS`](super::REPLY_KINDS).
+    /// The kind, one of [`REPLY_KINDS`](super::REPLY_KINDS), or `drive`.
     pub kind: &'static str,
     /// The signals that it reads, by index.
     pub inputs: Vec<usize>,
@@ -49,6 +50,7 @@ pub(crate) enum Behaviour {
     Blink(Blink),
     LifeSign(LifeSign),
     Rule(Box<Ruled>),
+    Drive(Box<Driven>),
 }
 
 impl Behaviour {
@@ -70,6 +72,7 @@ impl Behaviour {
             Self::Blink(it) => it.step(io),
             Self::LifeSign(it) => it.step(io),
             Self::Rule(it) => it.step(io),
+            Self::Drive(it) => it.step(io),
         }
     }
 }

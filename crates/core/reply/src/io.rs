@@ -49,6 +49,11 @@ impl Io<'_> {
         if moves { self.now } else { Nanos::MAX }
     }
 
+    /// True if the simulation writes the signal, in the place of the reply.
+    pub(crate) fn is_of_simulation(&self, output: Output) -> bool {
+        self.made[output.signal()].writer == Writer::Simulation
+    }
+
     pub(crate) fn put_bit(&mut self, output: Output, on: bool) {
         self.put_slot(output.signal(), Slot::from_real(f64::from(u8::from(on))));
     }

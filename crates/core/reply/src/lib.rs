@@ -2,13 +2,14 @@
 //!
 //! A PLC program waits for feedback that a model of motion does not have: a motor runs, oil is warm, a cylinder is out.
 //! A `[[reply]]` table of a driver.cfg, or a `[[machine.reply]]` of a test file, describes such feedback by its
-//! [kind](REPLY_KINDS). [`Replies`] makes the signals at every tick. Nothing here does any I/O or reads a clock: time
+//! [kind](REPLY_KINDS), and a `[[drive]]` the words of a drive. [`Replies`] makes the signals at every tick. Nothing here does any I/O or reads a clock: time
 //! and values come in, values go out. Random numbers come from a seed, so the same values in give the same ones out.
 
 mod awake;
 mod behaviour;
 mod condition;
 mod delay;
+mod drive;
 mod io;
 mod lag;
 mod levels;
@@ -26,6 +27,7 @@ mod travel;
 
 pub use behaviour::Reply;
 pub use condition::{Condition, Demand};
+pub use drive::{Drive, drives};
 pub use replies::Replies;
 pub use rule::{Course, Ramp, Rule, Values};
 pub use section::{

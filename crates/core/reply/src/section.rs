@@ -19,6 +19,7 @@ use self::reader::Reader;
 pub use self::rule::read_rule;
 pub use self::signals::{Signals, texts};
 use super::behaviour::{RULE, Reply};
+use super::levels::Levels;
 use super::order::order;
 
 /// The maximum number of replies of one machine.
@@ -121,6 +122,17 @@ fn check_writers(read: &[Read<'_>], scope: Scope<'_>) {
             );
         }
     }
+}
+
+/// Reads the conditions of one key of another section; returns the signals that they read, too.
+pub(crate) fn conditions<'a>(
+    key: &'static str,
+    value: &Value<'a>,
+    scope: Scope<'a>,
+) -> Option<(Levels, Vec<usize>)> {
+    let reader = Reader::new(vec![(key, value.clone())], scope);
+    let levels = reader.levels(key)??;
+    Some((levels, reader.finish().0))
 }
 
 /// Reads one section.

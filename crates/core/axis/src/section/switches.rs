@@ -120,6 +120,7 @@ fn read_switch(
         address: address?,
         station: None,
         structure: Some(Structure {
+            kind: "axis",
             table: number,
             end: place.byte + 1,
         }),

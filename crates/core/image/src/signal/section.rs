@@ -142,7 +142,9 @@ pub struct Section<'a> {
 /// A structure in the image that one table of the driver.cfg describes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Structure {
-    /// Index of the table: among the `[[axis]]` tables, from 0.
+    /// What the table describes: `axis` or `drive`.
+    pub kind: &'static str,
+    /// Index of the table among all of these, from 0.
     pub table: usize,
     /// Offset just beyond the structure, reserved bytes included.
     pub end: usize,
@@ -166,8 +168,8 @@ impl Section<'_> {
     pub fn title(&self) -> String {
         let name = self.name.as_ref().and_then(Value::as_text);
         match (name, self.structure) {
-            (Some(name), Some(_)) if !self.has_own_name() => {
-                format!("the axis \"{}\"", shown(name))
+            (Some(name), Some(Structure { kind, .. })) if !self.has_own_name() => {
+                format!("the {kind} \"{}\"", shown(name))
             }
             _ => self.label(),
         }

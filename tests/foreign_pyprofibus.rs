@@ -43,6 +43,13 @@ fn main() -> ExitCode {
                 records,
             ),
             #[cfg(unix)]
+            ("pyprofibus_reads_alarms_and_acknowledges_them", alarms),
+            #[cfg(unix)]
+            (
+                "pyprofibus_runs_a_drive_up_and_down_and_acknowledges_its_fault",
+                drives,
+            ),
+            #[cfg(unix)]
             (
                 "pyprofibus_reads_the_weighing_terminal_of_examples_devices",
                 weighs,
@@ -253,6 +260,113 @@ fn records() -> Result<(), Absent> {
         ramps.into_inner(),
         [0.0, f64::from(0x1234), f64::from(0x5678)]
     );
+    Ok(())
+}
+
+/// Alarms of a driver.cfg, raised by a signal, one of each type at a time.
+#[cfg(unix)]
+fn alarms() -> Result<(), Absent> {
+    let _alone = alone();
+    let folder = tempfile::tempdir().expect("a folder");
+    let own = folder.path().join("own.gsd");
+    let own = own.to_str().expect("UTF-8");
+    let mut master = foreign::python_with("main", &["pyprofibus", "serial"])?;
+    let line = pty::Line::new();
+    let port = line.end(0).display();
+    let alarm = |rest: &str, above: u32| {
+        format!(
+            "[[fault]]\nkind = \"diagnosis\"\n{rest}\nwhile = \"out > {}\"\n",
+            above << 24
+        )
+    };
+    let faults = [
+        alarm("alarm = \"process\"\nslot = 1\noctets = [0x11, 0x22]", 100),
+        alarm("alarm = \"process\"\nslot = 2", 100),
+        alarm("alarm = \"diagnosis\"\nslot = 3", 200),
+    ];
+    let text = format!(
+        "[driver]\nid = 1\nname = \"Cell\"\n[fieldbus]\nkind = \"profibus-device\"\ndevice = \"{port}\"\n\
+         baud = 500000\nmax_tsdr = 16000\nmax_age = \"5s\"\naddress = 8\nident = 0x80E1\nconfig = [0xF1]\n\
+         records = [\"slot 0 record 1 = 00\"]\n\
+         [[signal]]\nname = \"out\"\naddress = \"%QD0\"\ntype = \"UDINT\"\n\
+         [[signal]]\nname = \"in\"\naddress = \"%ID0\"\ntype = \"UDINT\"\n{}",
+        faults.concat()
+    );
+    write_gsd(folder.path(), &text, own);
+    let mut machine = Machine::open(&text);
+    machine.until("it listens", |machine| {
+        statistic(&machine.driver, "device").is_some()
+    });
+    master.arg(concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/tests/peers/profibus_alarms.py"
+    ));
+    master.arg(line.end(1));
+    master.args(["500000", "8", own, "2 words in and out, consistent"]);
+    let told = machine.until_the_end_of(master, |machine| {
+        machine.tick();
+        let value = machine.get("out");
+        machine.set("in", value);
+    });
+    let expected = [
+        "00 060201001122",
+        "5c010208 dc80b500",
+        "5c010200 5c010200",
+        "00 04020200",
+        "08 04010301",
+        "5c020200 5c020200",
+        "5c030101 5c030101",
+        "00 04010302",
+        "5c030102 5c030102",
+        "5c030102 dc80b500",
+        "profibus_alarms: ok",
+    ];
+    let expected = expected.join("\n");
+    assert!(told.contains(&expected), "expected {expected}\ntold {told}");
+    Ok(())
+}
+
+/// A `[[drive]]` on telegram 1, whose motor is too hot while a quarter of its speed is wanted.
+#[cfg(unix)]
+fn drives() -> Result<(), Absent> {
+    let _alone = alone();
+    let folder = tempfile::tempdir().expect("a folder");
+    let own = folder.path().join("own.gsd");
+    let own = own.to_str().expect("UTF-8");
+    let mut master = foreign::python_with("main", &["pyprofibus", "serial"])?;
+    let line = pty::Line::new();
+    let port = line.end(0).display();
+    let text = format!(
+        "[driver]\nid = 1\nname = \"Drive\"\n[fieldbus]\nkind = \"profibus-device\"\ndevice = \"{port}\"\n\
+         baud = 500000\nmax_tsdr = 16000\nmax_age = \"5s\"\naddress = 8\nident = 0x80E1\nconfig = [0xF1]\n\
+         parameters = [\"2000 FloatingPoint = 1500\", \"1120 FloatingPoint = 1\"]\n\
+         [[signal]]\nname = \"hot\"\naddress = \"%IX4.0\"\n\
+         [fieldbus.at]\nhot = \"slot 0 record 100 %IX0.0\"\n\
+         [[drive]]\nname = \"Spindle\"\ntelegram = 1\nreference_speed = 1500\nfault = \"hot\"\n\
+         ramp_up = \"1s\"\nramp_down = \"1s\"\nquick_stop = \"200ms\"\ncoast = \"300ms\"\n"
+    );
+    write_gsd(folder.path(), &text, own);
+    let mut machine = Machine::open(&text);
+    machine.until("it listens", |machine| {
+        statistic(&machine.driver, "device").is_some()
+    });
+    master.arg(concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/tests/peers/profibus_drive.py"
+    ));
+    master.arg(line.end(1));
+    master.args(["500000", "8", own, "2 words in and out, consistent"]);
+    let fastest = std::cell::Cell::new(0.0_f64);
+    let told = machine.until_the_end_of(master, |machine| {
+        machine.tick();
+        let wanted = machine.get("Spindle.NSOLL_A");
+        machine.set("hot", f64::from(u8::from((wanted - 375.0).abs() < 1.0)));
+        fastest.set(fastest.get().max(machine.get("Spindle.NIST_A")));
+    });
+    let parameters = "5e002ff0 5e002f1001010102080144bb800008013f800000";
+    assert!(told.contains(parameters), "{told}");
+    assert!(told.contains("profibus_drive: ok"), "{told}");
+    assert_eq!(fastest.get(), 1500.0, "{told}");
     Ok(())
 }
 

@@ -10,7 +10,7 @@ import struct
 import sys
 import time
 
-from profibus_master import open_master
+from profibus_station import open_master
 
 PATIENCE = 20
 GROSS, NET, TARE, TAKE_TARE, CLEAR_TARE = 10, 11, 12, 61, 62
@@ -18,7 +18,7 @@ GROSS, NET, TARE, TAKE_TARE, CLEAR_TARE = 10, 11, 12, 61, 62
 
 class Terminal:
     def __init__(self, arguments):
-        self.master, self.slave = open_master(arguments, size=8)
+        self.master, self.slave = open_master(*arguments, size=8)
 
     def exchange(self, command, value=0.0):
         """The indicator, the acknowledgement, the weight and net mode; None if the data are not valid."""

@@ -7,72 +7,10 @@ diagnoses that the station sent while data were exchanged, without repetitions. 
 that time, whatever comes back.
 """
 
-import os
 import sys
-import tempfile
 import time
 
-import pyprofibus
-from pyprofibus.dp import DpTelegram_SlaveDiag_Con
-
-CONF = """
-[PROFIBUS]
-debug=0
-[PHY]
-type=serial
-dev={device}
-baud={baud}
-[DP]
-master_class=1
-master_addr=2
-[SLAVE_0]
-name=station
-addr={address}
-gsd={gsd}
-sync_mode=0
-freeze_mode=0
-group_mask=1
-watchdog_ms=5000
-module_0={module}
-output_size={size}
-input_size={size}
-diag_period=0
-"""
-
-
-def open_master(arguments, size=4):
-    device, baud, address, gsd, module = arguments
-    with tempfile.NamedTemporaryFile("w", suffix=".conf", delete=False) as file:
-        file.write(CONF.format(device=device, baud=baud, address=address, gsd=gsd, module=module, size=size))
-    try:
-        conf = pyprofibus.PbConf.fromFile(file.name)
-    finally:
-        os.unlink(file.name)
-    master = conf.makeDPM()
-    slaves = []
-    for slave in conf.slaveConfs:
-        description = slave.makeDpSlaveDesc()
-        description.setUserPrmData(slave.gsd.getUserPrmData())
-        master.addSlave(description)
-        slaves.append(description)
-    master.initialize()
-    return master, slaves[0]
-
-
-def note_diagnoses():
-    """Records the diagnoses where the telegrams arrive, because pyprofibus keeps only the standard part."""
-    seen = []
-    read = DpTelegram_SlaveDiag_Con.fromFdlTelegram.__func__
-
-    def note(cls, telegram):
-        octets = bytes(telegram.du).hex()
-        # Before that the station is not ready.
-        if not telegram.du[0] & 0x02 and octets not in seen[-1:]:
-            seen.append(octets)
-        return read(cls, telegram)
-
-    DpTelegram_SlaveDiag_Con.fromFdlTelegram = classmethod(note)
-    return seen
+from profibus_station import note_diagnoses, open_master
 
 
 def count(master, slave, seconds):
@@ -88,7 +26,7 @@ def count(master, slave, seconds):
 
 def main():
     diagnoses = note_diagnoses()
-    master, slave = open_master(sys.argv[1:6])
+    master, slave = open_master(*sys.argv[1:6])
     if len(sys.argv) > 6:
         return count(master, slave, float(sys.argv[6]))
     exchanges = 0

@@ -4,6 +4,7 @@
 //! connections of the other kind (MS2), also while nobody exchanges data. Both carry the same requests to the same
 //! records.
 
+mod alarms;
 mod class2;
 mod drive;
 mod identification;
@@ -13,12 +14,15 @@ mod records;
 
 use tickbus_base::time::Nanos;
 
+pub use alarms::{Alarm, AlarmSupport};
+pub(crate) use alarms::{Alarms, enable_bit};
 use class2::Connections;
 pub(crate) use drive::{ELEMENT_LIMIT, INDEX as PARAMETERS};
 pub use drive::{Format, Parameter};
 pub use identification::Nameplate;
 pub(crate) use machine::Machine;
 pub use pdu::Refusal;
+use pdu::function;
 pub use records::Record;
 use records::{Called, Records};
 
@@ -26,7 +30,9 @@ use records::{Called, Records};
 pub(crate) mod sap {
     /// Opens a connection.
     pub(crate) const RESOURCE_MANAGER: u8 = 49;
-    /// Records, for the owner.
+    /// Acknowledgements of alarms, for the owner.
+    pub(crate) const ALARM: u8 = 50;
+    /// Records, and acknowledgements of alarms, for the owner.
     pub(crate) const CLASS_1: u8 = 51;
 }
 
@@ -38,6 +44,8 @@ pub(crate) const RECORD_LIMIT: usize = 240;
 pub struct Acyclic {
     /// The master that owns the station can read and write records (MS1), if its parameters say so.
     pub class_1: bool,
+    /// The alarms that the device can send to that master.
+    pub alarms: AlarmSupport,
     /// The connections that other masters can have at a time (MS2).
     pub connections: u8,
     /// The most octets of a record in the device, at most 240; 0 for as many.
@@ -92,6 +100,10 @@ pub(crate) struct Server {
     called: Called,
     connections: Connections,
     records: Records,
+    /// The answer to an acknowledgement at its own access point.
+    acknowledgement: Vec<u8>,
+    /// The alarms.
+    pub(crate) alarms: Alarms,
 }
 
 impl Server {
@@ -104,6 +116,8 @@ impl Server {
             called: Called::default(),
             connections: Connections::new(own.connections, own.send_timeout),
             records: Records::new(own, slots),
+            acknowledgement: Vec::new(),
+            alarms: Alarms::new(own.alarms),
         }
     }
 
@@ -111,6 +125,7 @@ impl Server {
     pub(crate) fn reset(&mut self, is_enabled: bool) {
         self.is_enabled = is_enabled && self.has_class_1;
         self.answer.clear();
+        self.acknowledgement.clear();
         self.called = Called::default();
     }
 
@@ -130,13 +145,26 @@ impl Server {
             return Reply::Closed;
         }
         if request.is_empty() {
-            return match std::mem::take(&mut self.answer) {
-                answer if answer.is_empty() => Reply::Nothing,
-                answer => Reply::Data(answer),
-            };
+            return fetch(&mut self.answer);
         }
         // A master that sends another request no longer waits for the answer to the last one.
-        self.answer = self.records.serve(request, &mut self.called, machine);
+        self.answer = if request[0] == function::ALARM_ACK {
+            acknowledge(&mut self.alarms, request)
+        } else {
+            self.records.serve(request, &mut self.called, machine)
+        };
+        Reply::Nothing
+    }
+
+    /// A telegram of the owner, which exchanges data, to the access point for acknowledgements of alarms.
+    pub(crate) fn acknowledge(&mut self, request: &[u8]) -> Reply {
+        if !self.is_enabled {
+            return Reply::Closed;
+        }
+        if request.is_empty() {
+            return fetch(&mut self.acknowledgement);
+        }
+        self.acknowledgement = acknowledge(&mut self.alarms, request);
         Reply::Nothing
     }
 
@@ -163,6 +191,31 @@ impl Server {
             records.serve(request, called, machine)
         })
     }
+}
+
+/// The answer that a master fetches.
+fn fetch(answer: &mut Vec<u8>) -> Reply {
+    match std::mem::take(answer) {
+        answer if answer.is_empty() => Reply::Nothing,
+        answer => Reply::Data(answer),
+    }
+}
+
+/// `Alarm_Ack`: the answer repeats the request, or refuses it.
+fn acknowledge(alarms: &mut Alarms, request: &[u8]) -> Vec<u8> {
+    let mut answer = Vec::new();
+    let why = match *request {
+        [function::ALARM_ACK, slot, kind, specifier] => {
+            if alarms.acknowledge(slot, kind, specifier) {
+                return request.to_vec();
+            }
+            Refusal::State
+        }
+        [function::ALARM_ACK, ..] => Refusal::Form,
+        _ => Refusal::NotSupported,
+    };
+    pdu::refuse(request[0], why, &mut answer);
+    answer
 }
 
 /// A master's end of a connection.

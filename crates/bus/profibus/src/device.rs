@@ -290,6 +290,14 @@ impl Process for Machine<'_> {
                     ),
                 );
             }
+            Event::AlarmDropped { kind, slot } => self.port.log(
+                log::Level::Warn,
+                "alarm dropped",
+                format_args!(
+                    "station {station}: no {kind} alarm of slot {slot} was sent: the master's parameters do not enable this \
+                     type, or the device's GSD file does not have it"
+                ),
+            ),
             Event::Left(why) => {
                 self.stations.all[index].receipt = None;
                 self.stations.all[index].is_cleared = false;

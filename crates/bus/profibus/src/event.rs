@@ -3,6 +3,7 @@
 use std::fmt;
 
 use tickbus_base::time::Nanos;
+use tickbus_fieldbus::faults::AlarmKind;
 
 use crate::acyclic::Refusal;
 
@@ -35,6 +36,14 @@ pub enum Event {
         index: u8,
         /// Why.
         why: Refusal,
+    },
+    /// An alarm was not sent, because the parameters of the master do not enable its type, or the device does not have
+    /// it.
+    AlarmDropped {
+        /// The type.
+        kind: AlarmKind,
+        /// The slot.
+        slot: u8,
     },
     /// The station no longer exchanges data, or never did: why.
     Left(Leaving),

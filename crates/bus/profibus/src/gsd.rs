@@ -18,6 +18,7 @@ use std::sync::Arc;
 
 use tickbus_base::Mistake;
 
+use crate::acyclic::AlarmSupport;
 use crate::user_parameters::ParameterBlock;
 
 /// A station's description, from a GSD file.
@@ -71,6 +72,8 @@ pub struct Gsd {
     pub c1_read_write: bool,
     /// The most octets of a record for that master.
     pub c1_max_data: u8,
+    /// The alarms that the device can send.
+    pub alarms: AlarmSupport,
     /// True if other masters can read and write records.
     pub c2_read_write: bool,
     /// The most octets of a record for other masters.

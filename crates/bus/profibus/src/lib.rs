@@ -25,7 +25,9 @@ mod station;
 pub mod telegram;
 mod user_parameters;
 
-pub use acyclic::{Acyclic, Format, Nameplate, Parameter as DriveParameter, Record, Refusal};
+pub use acyclic::{
+    Acyclic, Alarm, AlarmSupport, Format, Nameplate, Parameter as DriveParameter, Record, Refusal,
+};
 pub use configuration::{Configuration, SlotModule};
 pub use device::{LineOptions, ProfibusDevice};
 pub use event::{Event, Leaving};

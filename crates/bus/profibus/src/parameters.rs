@@ -56,6 +56,11 @@ impl<'a> Parameters<'a> {
         dpv1 && self.user.first().is_some_and(|octet| octet & 0x80 != 0)
     }
 
+    /// The octets of DPV1 with the types of alarms that the master enables, and how many it takes at a time.
+    pub(crate) fn alarms(&self) -> Option<[u8; 2]> {
+        self.user.get(1..3)?.try_into().ok()
+    }
+
     /// True if the master signals CLEAR by telegrams without outputs, according to the parameter octets of DPV1.
     pub(crate) fn fail_safe(&self, dpv1: bool) -> bool {
         dpv1 && self.user.first().is_some_and(|octet| octet & 0x40 != 0)

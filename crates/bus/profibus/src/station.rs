@@ -7,7 +7,7 @@ mod start_up;
 
 use tickbus_base::time::Nanos;
 
-use crate::acyclic::{Acyclic, Server};
+use crate::acyclic::{Acyclic, Alarm, Server};
 use crate::configuration::Configuration;
 use crate::event::{Event, Leaving};
 use crate::telegram::{BROADCAST, Control, Frame, append_short_ack};
@@ -93,6 +93,8 @@ pub struct Diagnosed {
     pub blocks: Vec<Vec<u8>>,
     /// The station cannot exchange data properly while the diagnosis lasts (`Stat_Diag`): the master keeps reading it.
     pub is_static: bool,
+    /// The causes of alarms that are there. A new one raises an alarm, as does the end of an error.
+    pub alarms: Vec<Alarm>,
 }
 
 /// The states of a DP slave; `Power_On` precedes its construction.
@@ -249,6 +251,7 @@ impl Station {
     /// Does what is due at `now`.
     pub fn turn(&mut self, now: Nanos, process: &mut impl Process) {
         self.acyclic.turn(now);
+        self.tell_dropped_alarms(now, process);
         if self.watchdog_ends() <= now
             && let Some(time) = self.watchdog
         {
@@ -276,6 +279,8 @@ impl Station {
         self.has_more = has_more;
         self.is_static = diagnosed.is_static;
         self.is_news |= is_news;
+        self.acyclic.alarms.raise(&diagnosed.alarms);
+        self.offer_alarm();
     }
 
     /// Takes a request to this station or to all, and appends its answer, if any.
@@ -356,6 +361,10 @@ impl Station {
             sap::SLAVE_DIAG => {
                 self.append_diagnosis(&mut data);
                 self.is_news &= !(is_owner || self.owner.is_none());
+                if is_owner {
+                    self.acyclic.alarms.read();
+                    self.offer_alarm();
+                }
                 Answer::Data(Control::DATA_LOW, &data)
             }
             sap::GET_CFG => Answer::Data(Control::DATA_LOW, self.identity.configuration.bytes()),
@@ -425,6 +434,7 @@ impl Station {
         self.outputs.fill(0);
         self.is_cleared = true;
         self.acyclic.reset(false);
+        self.acyclic.alarms.clear();
         // An answer of another state is not repeated.
         self.last.head = None;
         process.tell(self.address, now, Event::Left(why));

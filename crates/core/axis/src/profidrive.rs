@@ -137,7 +137,11 @@ impl Profidrive {
 
     /// True while the words to the PLC change although those of the PLC do not.
     pub fn moves(&self) -> bool {
-        self.has_changed || self.speed != 0.0 || self.positioner.moves() || self.life_sign != 0
+        self.has_changed
+            || matches!(self.state, State::RampStop | State::QuickStop)
+            || self.speed != 0.0
+            || self.positioner.moves()
+            || self.life_sign != 0
     }
 
     /// Advances by `seconds`, with the words from the PLC; returns those to the PLC.

@@ -321,9 +321,9 @@ fn check_names(sections: &[Section<'_>]) {
         if let (Some(name), true, false) = (&wrong.name, wrong.has_own_name(), twins) {
             name.wrong(
                 format!(
-                    "the name \"{}\" is that of a signal of {} on line {}",
+                    "the name \"{}\" is that of a signal of the {} on line {}",
                     shown(&section.signal.name),
-                    other.title(),
+                    other.structure.map_or("table", |structure| structure.kind),
                     line_of(other),
                 ),
                 "choose another",

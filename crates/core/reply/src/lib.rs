@@ -27,11 +27,11 @@ mod travel;
 
 pub use behaviour::Reply;
 pub use condition::{Condition, Demand};
-pub use drive::{Drive, drives};
 pub use replies::Replies;
 pub use rule::{Course, Ramp, Rule, Values};
 pub use section::{
-    LIMIT, OneOf, REPLY_KEYS, REPLY_KINDS, Scope, Signals, one_of, read_rule, read_sections, texts,
+    Drive, LIMIT, OneOf, REPLY_KEYS, REPLY_KINDS, Scope, Signals, drives, one_of, read_rule,
+    read_sections, texts,
 };
 pub use setting::Setting;
 pub use signal::real;

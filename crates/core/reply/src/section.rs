@@ -1,5 +1,6 @@
 //! The `[[reply]]` sections of a driver.cfg, and the `[[machine.reply]]` sections of a test file.
 
+mod drives;
 mod keys;
 mod kinds;
 mod reader;
@@ -13,13 +14,13 @@ use tickbus_base::toml_text::{Table, TableKind, Value, shown};
 use tickbus_image::signal::section::NAME_LIMIT;
 use tickbus_image::signal::{Area, SignalTable};
 
+pub use self::drives::{Drive, drives};
 pub use self::keys::{REPLY_KEYS, REPLY_KINDS};
 pub use self::kinds::{OneOf, one_of};
 use self::reader::Reader;
 pub use self::rule::read_rule;
 pub use self::signals::{Signals, texts};
 use super::behaviour::{RULE, Reply};
-use super::levels::Levels;
 use super::order::order;
 
 /// The maximum number of replies of one machine.
@@ -122,17 +123,6 @@ fn check_writers(read: &[Read<'_>], scope: Scope<'_>) {
             );
         }
     }
-}
-
-/// Reads the conditions of one key of another section; returns the signals that they read, too.
-pub(crate) fn conditions<'a>(
-    key: &'static str,
-    value: &Value<'a>,
-    scope: Scope<'a>,
-) -> Option<(Levels, Vec<usize>)> {
-    let reader = Reader::new(vec![(key, value.clone())], scope);
-    let levels = reader.levels(key)??;
-    Some((levels, reader.finish().0))
 }
 
 /// Reads one section.

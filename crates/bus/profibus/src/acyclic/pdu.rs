@@ -9,6 +9,7 @@ pub(super) mod function {
     pub(in super::super) const RESOURCE_MANAGER: u8 = 0x56;
     pub(in super::super) const INITIATE: u8 = 0x57;
     pub(in super::super) const ABORT: u8 = 0x58;
+    pub(in super::super) const ALARM_ACK: u8 = 0x5C;
     pub(in super::super) const READ: u8 = 0x5E;
     pub(in super::super) const WRITE: u8 = 0x5F;
     /// In an answer: the service is refused.
@@ -32,7 +33,7 @@ pub enum Refusal {
     Slot = 0xB2,
     /// The request does not have the form of its service.
     Form = 0xB3,
-    /// The request needs another one before.
+    /// The request needs another one before, or the alarm to be acknowledged does not exist.
     State = 0xB5,
     /// The record can only be read.
     Access = 0xB6,

@@ -2,6 +2,7 @@
 
 use tickbus_fieldbus::faults::{Diagnosis, Finding};
 
+use crate::acyclic::Alarm;
 use crate::configuration::Configuration;
 use crate::station::Diagnosed;
 
@@ -26,6 +27,11 @@ pub(super) fn diagnosed<'a>(
                 slots.resize(slots.len().max(at / 8 + 1), 0);
                 slots[at / 8] |= 1 << (at % 8);
             }
+            Finding::Alarm { kind, slot, octets } => told.alarms.push(Alarm {
+                kind: *kind,
+                slot: *slot,
+                data: octets.map_or_else(Vec::new, |octets| octets.get().to_vec()),
+            }),
             Finding::Channel {
                 slot,
                 channel,
@@ -58,7 +64,7 @@ fn with_header(kind: u8, octets: &[u8]) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tickbus_fieldbus::faults::{ChannelError, Octets};
+    use tickbus_fieldbus::faults::{AlarmKind, ChannelError, Octets};
 
     #[test]
     fn findings_become_the_blocks_of_the_standard() {
@@ -85,10 +91,21 @@ mod tests {
                 ..finding(Finding::Module(10))
             },
             channel(3, 63, ChannelError::Error),
+            finding(Finding::Alarm {
+                kind: AlarmKind::Process,
+                slot: 0,
+                octets: Octets::new(&[0x33]),
+            }),
             // A module that the station does not have.
             channel(4, 1, ChannelError::Error),
         ];
-        let told = diagnosed(&modules, all.iter());
+        let mut told = diagnosed(&modules, all.iter());
+        let alarm = Alarm {
+            kind: AlarmKind::Process,
+            slot: 0,
+            data: vec![0x33],
+        };
+        assert_eq!(std::mem::take(&mut told.alarms), [alarm]);
         let blocks: [&[u8]; 6] = [
             &[0x03, 0x11, 0x22],
             &[0x43, 0b0000_0100, 0b0000_0010],

@@ -82,6 +82,7 @@ impl Gsd {
             .filter_map(|(is_there, room)| (is_there && room > 0).then_some(room));
         Acyclic {
             class_1,
+            alarms: self.alarms,
             connections: if class_2 { self.c2_channels.max(1) } else { 0 },
             max_data: rooms.min().unwrap_or(0),
             nameplate: Nameplate {

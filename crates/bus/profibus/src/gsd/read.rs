@@ -5,9 +5,11 @@ use std::slice::Iter;
 use std::sync::Arc;
 
 use tickbus_base::toml_text::shown;
+use tickbus_fieldbus::faults::AlarmKind;
 
 use super::lines::{Line, Values, lines, wrong};
 use super::{DiagnosisArea, Gsd, GsdError, Module, Slot};
+use crate::acyclic::enable_bit;
 use crate::rates::RATES;
 use crate::user_parameters::{Allowed, LIMIT, Parameter, ParameterBlock, ParameterKind};
 
@@ -104,6 +106,12 @@ impl Reader<'_> {
             "ordernumber" => gsd.order = values.quoted()?,
             "c1_read_write_supp" => gsd.c1_read_write = flag(values)?,
             "c1_max_data_len" => gsd.c1_max_data = octet(values)?,
+            "alarm_sequence_mode_count" => gsd.alarms.sequence = octet(values)?,
+            "diagnostic_alarm_supp" => self.alarm(AlarmKind::Diagnosis, values)?,
+            "process_alarm_supp" => self.alarm(AlarmKind::Process, values)?,
+            "pull_plug_alarm_supp" => self.alarm(AlarmKind::Pull, values)?,
+            "status_alarm_supp" => self.alarm(AlarmKind::Status, values)?,
+            "update_alarm_supp" => self.alarm(AlarmKind::Update, values)?,
             "c2_read_write_supp" => gsd.c2_read_write = flag(values)?,
             "c2_max_data_len" => gsd.c2_max_data = octet(values)?,
             "c2_max_count_channels" => gsd.c2_channels = octet(values)?,
@@ -122,6 +130,14 @@ impl Reader<'_> {
                 }
                 None => self.rate(key, values)?,
             },
+        }
+        Ok(())
+    }
+
+    /// A type of alarm that the device has, or has not.
+    fn alarm(&mut self, kind: AlarmKind, values: Values<'_>) -> Result<(), GsdError> {
+        if flag(values)? {
+            self.gsd.alarms.types |= enable_bit(kind);
         }
         Ok(())
     }

@@ -177,6 +177,14 @@ fn services(acyclic: &Acyclic) -> Vec<String> {
         "C1_Read_Write_supp=1".to_owned(),
         format!("C1_Max_Data_Len={room}"),
         format!("C1_Response_Timeout={RESPONSE}"),
+        "Diagnostic_Alarm_supp=1".to_owned(),
+        "Process_Alarm_supp=1".to_owned(),
+        "Pull_Plug_Alarm_supp=1".to_owned(),
+        "Status_Alarm_supp=1".to_owned(),
+        "Update_Alarm_supp=1".to_owned(),
+        format!("Alarm_Sequence_Mode_Count={}", acyclic.alarms.sequence),
+        "Alarm_Type_Mode_supp=1".to_owned(),
+        "Extra_Alarm_SAP_supp=1".to_owned(),
         "C2_Read_Write_supp=1".to_owned(),
         format!("C2_Max_Data_Len={room}"),
         format!("C2_Response_Timeout={RESPONSE}"),
@@ -217,6 +225,7 @@ fn plain(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::AlarmSupport;
     use crate::Gsd;
     use crate::configuration::Configuration;
     use crate::user_parameters::UserParameters;
@@ -333,6 +342,7 @@ mod tests {
             identity.acyclic = Acyclic {
                 class_1: true,
                 connections: 2,
+                alarms: AlarmSupport::ALL,
                 ..Acyclic::default()
             };
         }
@@ -350,6 +360,7 @@ mod tests {
             (acyclic.class_1, acyclic.connections, acyclic.room()),
             (true, 2, 240)
         );
+        assert_eq!(acyclic.alarms, AlarmSupport::ALL);
         assert_eq!(acyclic.nameplate.order, "Cell _4_, S_d");
         let theirs = gsd_parser::parser::parse(std::path::Path::new("x.gsd"), &written);
         assert_eq!(theirs.expect("they read it").ident_number, 0x80E0);

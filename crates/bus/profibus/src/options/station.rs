@@ -9,7 +9,7 @@ use tickbus_base::toml_text::{Key, Shape, Table, Value};
 use tickbus_image::signal;
 
 use super::Keys;
-use crate::acyclic::{Acyclic, Nameplate, PARAMETERS};
+use crate::acyclic::{Acyclic, AlarmSupport, Nameplate, PARAMETERS};
 use crate::configuration::Configuration;
 use crate::drive::FixedParameter;
 use crate::gsd::Gsd;
@@ -210,6 +210,7 @@ pub(super) fn plain_acyclic(name: &str) -> Acyclic {
     Acyclic {
         class_1: true,
         connections: 2,
+        alarms: AlarmSupport::ALL,
         nameplate: Nameplate {
             order: name.to_owned(),
             ..Nameplate::default()

@@ -39,6 +39,20 @@ impl<P: Process> Machine for Bound<'_, P> {
 }
 
 impl Station {
+    /// Puts the next alarm into the diagnosis, while the owner exchanges data.
+    pub(super) fn offer_alarm(&mut self) {
+        if self.state == State::DataExch {
+            self.is_news |= self.acyclic.alarms.offer();
+        }
+    }
+
+    /// Reports the alarms that the owner's parameters do not enable.
+    pub(super) fn tell_dropped_alarms(&mut self, now: Nanos, process: &mut impl Process) {
+        for (kind, slot) in self.acyclic.alarms.take_dropped() {
+            process.tell(self.address, now, Event::AlarmDropped { kind, slot });
+        }
+    }
+
     /// A telegram for the service access point `dsap`, which is none of DP-V0.
     pub(super) fn serve_acyclic(
         &mut self,
@@ -63,7 +77,8 @@ impl Station {
         let answer = match dsap {
             _ if request.ssap.is_none() => Reply::Closed,
             sap::CLASS_1 if owner_exchanges => own.class_1(request.data, &mut machine),
-            sap::CLASS_1 => Reply::Closed,
+            sap::ALARM if owner_exchanges => own.acknowledge(request.data),
+            sap::CLASS_1 | sap::ALARM => Reply::Closed,
             sap::RESOURCE_MANAGER => own.open(now, peer, request.data),
             _ => own.class_2(now, peer, dsap, request.data, &mut machine),
         };
@@ -73,5 +88,6 @@ impl Station {
             Reply::Nothing => append_short_ack(reply),
             Reply::Data(data) => self.answer(request, Control::DATA_LOW, &data, reply),
         }
+        self.offer_alarm();
     }
 }

@@ -23,10 +23,19 @@ impl Station {
     pub(super) fn append_diagnosis(&self, out: &mut Vec<u8>) {
         let flag = |bit: u8, is_set: bool| u8::from(is_set) << bit;
         let waits = self.state == State::WaitPrm;
+        let alarm = self.acyclic.alarms.block().unwrap_or_default();
+        // An alarm takes the place of other blocks, if there is not room for both.
+        let room = room(self.identity.max_diagnosis);
+        let fits = alarm.len() + self.extended.len() <= room;
+        let extended: &[u8] = if fits { &self.extended } else { &[] };
+        let has_more = self.has_more || !fits;
         out.push(
             flag(1, self.state != State::DataExch)
                 | flag(2, self.faults.configuration)
-                | flag(3, !self.extended.is_empty() || self.has_more)
+                | flag(
+                    3,
+                    !self.extended.is_empty() || self.has_more || self.acyclic.alarms.has_error(),
+                )
                 | flag(4, self.faults.not_supported)
                 | flag(6, self.faults.parameters),
         );
@@ -39,10 +48,11 @@ impl Station {
                 | flag(4, self.is_frozen)
                 | flag(5, self.is_synced),
         );
-        out.push(flag(7, self.has_more));
+        out.push(flag(7, has_more));
         // 255: no master.
         out.push(self.owner.unwrap_or(0xFF));
         out.extend(self.identity.ident.to_be_bytes());
-        out.extend_from_slice(&self.extended);
+        out.extend_from_slice(extended);
+        out.extend(alarm);
     }
 }

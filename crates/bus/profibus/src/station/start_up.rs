@@ -70,8 +70,10 @@ impl Station {
             self.watchdog = watchdog;
             self.fail_safe = self.identity.fail_safe || parameters.fail_safe(self.identity.dpv1);
             self.heard = now;
-            self.acyclic
-                .reset(parameters.enables_dpv1(self.identity.dpv1));
+            let is_enabled = parameters.enables_dpv1(self.identity.dpv1);
+            self.acyclic.reset(is_enabled);
+            let [types, mode] = parameters.alarms().filter(|_| is_enabled).unwrap_or([0; 2]);
+            self.acyclic.alarms.enable(types, mode);
             if self.state == State::WaitPrm {
                 self.owner = Some(master);
                 self.state = State::WaitCfg;
@@ -109,6 +111,7 @@ impl Station {
         if self.state == State::WaitCfg {
             self.state = State::DataExch;
             process.tell(self.address, now, Event::Exchanges { master });
+            self.offer_alarm();
         }
     }
 }

@@ -2,6 +2,7 @@ use super::*;
 use crate::Gsd;
 use crate::telegram::{DATA_LIMIT, Telegram};
 
+mod alarms;
 mod records;
 
 const MASTER: u8 = 2;
@@ -158,6 +159,7 @@ impl Rig {
         self.station.diagnose(&Diagnosed {
             blocks: blocks.iter().map(|block| block.to_vec()).collect(),
             is_static,
+            alarms: Vec::new(),
         });
     }
 

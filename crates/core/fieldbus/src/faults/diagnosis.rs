@@ -33,6 +33,46 @@ pub enum Finding {
         /// The problem of the channel.
         error: ChannelError,
     },
+    /// An alarm, which the master acknowledges.
+    Alarm {
+        /// The type.
+        kind: AlarmKind,
+        /// The slot; 0 is the device itself.
+        slot: u8,
+        /// The device's own octets, if there are any.
+        octets: Option<Octets>,
+    },
+}
+
+/// A type of alarm; the numbers are those of PROFIBUS DP.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs, reason = "their names say it")]
+pub enum AlarmKind {
+    Diagnosis = 1,
+    Process = 2,
+    Pull = 3,
+    Plug = 4,
+    Status = 5,
+    Update = 6,
+}
+
+impl AlarmKind {
+    /// All types, with their names in a fault.
+    pub(super) const ALL: [(&'static str, Self); 6] = [
+        ("diagnosis", Self::Diagnosis),
+        ("process", Self::Process),
+        ("pull", Self::Pull),
+        ("plug", Self::Plug),
+        ("status", Self::Status),
+        ("update", Self::Update),
+    ];
+}
+
+impl fmt::Display for AlarmKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let found = Self::ALL.iter().find(|(_, other)| other == self);
+        f.write_str(found.map_or("", |(name, _)| name))
+    }
 }
 
 /// A few octets.
@@ -106,6 +146,7 @@ impl fmt::Display for Finding {
                 let name = name.map_or("error", |(name, _)| name);
                 write!(f, "{name} at channel {channel} of slot {slot}")
             }
+            Self::Alarm { kind, slot, .. } => write!(f, "{kind} alarm of slot {slot}"),
         }
     }
 }

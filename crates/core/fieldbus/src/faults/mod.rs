@@ -30,7 +30,7 @@ pub use answer::{
 pub use board::FaultBoard;
 pub use cell::{FaultStatus, Phase};
 pub use condition::{Condition, unknown};
-pub use diagnosis::{ChannelError, Diagnosis, Finding, Octets};
+pub use diagnosis::{AlarmKind, ChannelError, Diagnosis, Finding, Octets};
 pub use fault::{Begin, Direction, Effect, Fault, Lasts, LineEffect, SignalEffect};
 pub use line_fault::LineFault;
 pub use line_faults::{Fate, LineFaults, Shape, Taken};

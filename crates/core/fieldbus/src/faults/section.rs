@@ -155,6 +155,7 @@ struct Keys<'a> {
     code: Option<Value<'a>>,
     how: Option<Value<'a>>,
     octets: Option<Value<'a>>,
+    alarm: Option<Value<'a>>,
     static_: Option<Value<'a>>,
     seed: Option<Value<'a>>,
     at: Option<Value<'a>>,
@@ -187,6 +188,7 @@ impl<'a> Keys<'a> {
             code: table.take("code"),
             how: table.take("how"),
             octets: table.take("octets"),
+            alarm: table.take("alarm"),
             static_: table.take("static"),
             seed: table.take("seed"),
             at: table.take("at"),
@@ -200,7 +202,7 @@ impl<'a> Keys<'a> {
     }
 
     /// The keys that only some kinds have.
-    fn of_kinds(&self) -> [(&'static str, Option<&Value<'a>>); 18] {
+    fn of_kinds(&self) -> [(&'static str, Option<&Value<'a>>); 19] {
         [
             ("signal", self.signal.as_ref()),
             ("value", self.value.as_ref()),
@@ -218,6 +220,7 @@ impl<'a> Keys<'a> {
             ("code", self.code.as_ref()),
             ("how", self.how.as_ref()),
             ("octets", self.octets.as_ref()),
+            ("alarm", self.alarm.as_ref()),
             ("static", self.static_.as_ref()),
             ("seed", self.seed.as_ref()),
         ]

@@ -3,7 +3,7 @@
 use super::*;
 
 /// A device with a record in slot 1, which is read at the access point of the owner.
-fn with_records(dpv1: bool) -> Identity {
+pub(super) fn with_records(dpv1: bool) -> Identity {
     Identity {
         dpv1,
         acyclic: Acyclic {
@@ -22,10 +22,10 @@ fn with_records(dpv1: bool) -> Identity {
     }
 }
 
-/// Data exchange after parameters that begin with this octet of DPV1.
-fn exchanging_with(identity: Identity, status: u8) -> Rig {
+/// Data exchange after parameters that begin with these octets of DPV1.
+pub(super) fn exchanging_with(identity: Identity, [first, second, third]: [u8; 3]) -> Rig {
     let mut rig = Rig::new(identity);
-    let parameters = [LOCK, 0, 0, 11, 0x80, 0xE0, 0, status, 0, 0];
+    let parameters = [LOCK, 0, 0, 11, 0x80, 0xE0, 0, first, second, third];
     assert_eq!(rig.ask(61, &parameters), Came::Short);
     assert_eq!(rig.ask(62, &[0x50, 0x60]), Came::Short);
     rig
@@ -36,10 +36,10 @@ const READ: [u8; 4] = [0x5E, 1, 10, 240];
 #[test]
 fn the_owner_reads_records_if_its_parameters_enable_that_and_while_it_exchanges_data() {
     for (dpv1, status) in [(true, 0), (false, 0x80)] {
-        let mut rig = exchanging_with(with_records(dpv1), status);
+        let mut rig = exchanging_with(with_records(dpv1), [status, 0, 0]);
         assert_eq!(rig.from(51, Some(51), 0x5D, &READ), refused());
     }
-    let mut rig = exchanging_with(with_records(true), 0x80);
+    let mut rig = exchanging_with(with_records(true), [0x80, 0, 0]);
     assert_eq!(rig.from(51, Some(51), 0x5D, &READ), Came::Short);
     let answer = data(&[0x5E, 1, 10, 1, 7]);
     assert_eq!(rig.from(51, Some(51), 0x7D, &[]), answer);

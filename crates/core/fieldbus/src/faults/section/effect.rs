@@ -1,13 +1,13 @@
 //! The effect of a fault: the keys of its kind.
 
-use super::keys::{DIAGNOSIS_LIMIT, DIRECTIONS, SIGNAL};
+use super::keys::{ALARM_SLOT_LIMIT, DIAGNOSIS_LIMIT, DIRECTIONS, SIGNAL};
 use super::{Keys, Scope};
 use crate::faults::condition::unknown;
 use crate::faults::diagnosis::OCTET_LIMIT;
 use crate::faults::fault::{LATE_VALUES, MODEL};
 use crate::faults::{
-    AnswerCodes, AnswerEffect, AnswerTrouble, ChannelError, Diagnosis, Direction, Effect, Elements,
-    Finding, LineEffect, Octets, SignalEffect, WrongAnswer, measure,
+    AlarmKind, AnswerCodes, AnswerEffect, AnswerTrouble, ChannelError, Diagnosis, Direction, Effect,
+    Elements, Finding, LineEffect, Octets, SignalEffect, WrongAnswer, measure,
 };
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Value, did_you_mean, short_number, shown};
@@ -254,16 +254,41 @@ fn read_diagnosis(keys: &Keys<'_>, table: &SignalTable, whole: bool) -> Option<D
         None => Some(0),
     };
     let is_static = keys.static_.as_ref().map_or(Some(false), Value::boolean);
-    let slot = keys
-        .slot
-        .as_ref()
-        .map(|slot| small(slot, 1..=DIAGNOSIS_LIMIT));
+    let alarm = keys.alarm.as_ref();
+    let alarm = alarm.map(|alarm| alarm.choice("types of alarms", &AlarmKind::ALL));
+    let slots = if alarm.is_some() {
+        0..=ALARM_SLOT_LIMIT
+    } else {
+        1..=DIAGNOSIS_LIMIT
+    };
+    let slot = keys.slot.as_ref().map(|slot| small(slot, slots));
     let channel = keys.channel.as_ref();
     let channel = channel.map(|channel| small(channel, 0..=DIAGNOSIS_LIMIT - 1));
     let error = keys.error.as_ref();
     let error = error.map(|error| error.choice("errors", &ChannelError::ALL));
     let octets = keys.octets.as_ref().map(read_octets);
+    if let (Some(_), Some(value)) = (&alarm, &keys.static_) {
+        value.wrong("an alarm is not static", "remove \"static\"");
+        return None;
+    }
     let finding = match (octets, slot, channel, error) {
+        (octets, Some(slot), None, None) if alarm.is_some() => Finding::Alarm {
+            kind: alarm.flatten()?,
+            slot: slot?,
+            octets: match octets {
+                Some(octets) => Some(octets?),
+                None => None,
+            },
+        },
+        _ if alarm.is_some() => {
+            if let (Some(value), true) = (&keys.alarm, whole) {
+                value.wrong(
+                    "an alarm has a slot, and may have octets",
+                    "write slot = 2, and remove \"channel\" and \"error\"",
+                );
+            }
+            return None;
+        }
         (Some(octets), None, None, None) => Finding::Device(octets?),
         (None, Some(slot), None, None) => Finding::Module(slot?),
         (None, Some(slot), Some(channel), error) => Finding::Channel {

@@ -5,7 +5,7 @@ use tickbus_image::signal::section::NAME_LIMIT;
 
 use super::super::Direction;
 use super::super::answer::WrongAnswer;
-use super::super::diagnosis::{ChannelError, OCTET_LIMIT};
+use super::super::diagnosis::{AlarmKind, ChannelError, OCTET_LIMIT};
 use super::super::fault::{LATE_VALUES, MODEL};
 
 const fn kind(
@@ -95,7 +95,9 @@ pub const FAULT_KINDS: [TableKind; 15] = [
     kind(
         "diagnosis",
         &[],
-        &["station", "slot", "channel", "error", "octets", "static"],
+        &[
+            "station", "slot", "channel", "error", "octets", "static", "alarm",
+        ],
     ),
     TableKind {
         needs_name: true,
@@ -114,6 +116,9 @@ pub(super) const DIRECTIONS: [(&str, Direction); 3] = [
 
 /// The maximum number of slots and channels that a diagnosis distinguishes in a station.
 pub(super) const DIAGNOSIS_LIMIT: i128 = 64;
+
+/// The greatest slot of an alarm.
+pub(super) const ALARM_SLOT_LIMIT: i128 = 254;
 
 /// A number, or a text with a number and its unit.
 const QUANTITY: Shape = Shape::Any(&[Shape::Number, Shape::Text]);
@@ -189,8 +194,8 @@ pub const FAULT_KEYS: &[Key] = &[
     ),
     Key::new(
         "slot",
-        Shape::Whole(1, DIAGNOSIS_LIMIT),
-        "diagnosis: the slot of the module",
+        Shape::Whole(0, ALARM_SLOT_LIMIT),
+        "diagnosis: the slot of the module, 1 to 64; of an alarm 0 to 254",
     ),
     Key::new(
         "channel",
@@ -206,6 +211,11 @@ pub const FAULT_KEYS: &[Key] = &[
         "octets",
         Shape::List(&Shape::Whole(0, 255), 1, OCTET_LIMIT),
         "diagnosis: octets of the device's own",
+    ),
+    Key::new(
+        "alarm",
+        Shape::Choice(&names(&AlarmKind::ALL)),
+        "diagnosis: an alarm of this type (DP-V1), which the master acknowledges",
     ),
     Key::new(
         "static",

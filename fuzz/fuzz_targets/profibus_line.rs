@@ -8,7 +8,7 @@ use libfuzzer_sys::fuzz_target;
 use tickbus_base::time::Nanos;
 use tickbus_bus_profibus::telegram::{DATA_LIMIT, Telegram};
 use tickbus_bus_profibus::{
-    Acyclic, Configuration, Diagnosed, DriveParameter, Event, Format, Gsd, Identity, Nameplate, Process, Record, Segment, Station, UserParameters,
+    Acyclic, Alarm, AlarmKind, AlarmSupport, Configuration, Diagnosed, DriveParameter, Event, Format, Gsd, Identity, Nameplate, Process, Record, Segment, Station, UserParameters,
 };
 
 fuzz_target!(|data: &[u8]| {
@@ -59,6 +59,13 @@ fn line(dpv1: bool, mut stream: &[u8]) {
         let diagnosed = Diagnosed {
             blocks: vec![vec![0x42, 1]; usize::from(pause % 3)],
             is_static: pause % 5 == 0,
+            alarms: (0..pause % 4)
+                .map(|slot| Alarm {
+                    kind: if pause % 7 == 0 { AlarmKind::Process } else { AlarmKind::Diagnosis },
+                    slot,
+                    data: vec![0; usize::from(pause % 33)],
+                })
+                .collect(),
         };
         segment.station_mut(3).expect("it is there").diagnose(&diagnosed);
         let Ok(heard) = segment.hear(now, piece, &mut Machine, &mut reply) else {
@@ -81,6 +88,7 @@ fn acyclic() -> Acyclic {
     };
     Acyclic {
         class_1: true,
+        alarms: AlarmSupport::ALL,
         connections: 2,
         max_data: 240,
         send_timeout: 1,

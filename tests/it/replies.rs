@@ -289,3 +289,64 @@ fn tickbus(folder: &Path, arguments: &[&str]) -> (bool, String) {
         [output.stdout, output.stderr].map(|text| String::from_utf8_lossy(&text).into_owned());
     (output.status.success(), texts.concat())
 }
+
+/// A drive whose words the mirror takes from the signals "Control" and "Wanted".
+const DRIVE: &str = "[[signal]]\nname = \"Control\"\naddress = \"%IW10\"\n\
+                     [[signal]]\nname = \"Wanted\"\naddress = \"%IW12\"\ntype = \"INT\"\n\
+                     [[signal]]\nname = \"Hot\"\naddress = \"%IX4.0\"\n\
+                     [[drive]]\nname = \"Fan\"\ntelegram = 1\nreference_speed = 16384\ncommand_offset = 10\n\
+                     feedback_offset = 20\nramp_up = \"100ms\"\nramp_down = \"200ms\"\nfault = \"Hot\"\n";
+
+const CONTROL: usize = 6;
+const WANTED: usize = 7;
+const HOT: usize = 8;
+const ZSW1: usize = 11;
+const NIST_A: usize = 12;
+
+impl Line {
+    /// The PLC writes STW1; the drive's states of ZSW1 bits 0 to 3 and 6, without repetitions, for so many ticks.
+    fn drives(&mut self, stw1: u16, ticks: usize) -> Vec<f64> {
+        self.slots[CONTROL] = Slot::from_real(stw1.into());
+        let seen = self.seen(ZSW1, ticks);
+        let mut states: Vec<f64> = seen
+            .iter()
+            .map(|word| word % 16.0 + 64.0 * (word / 64.0 % 2.0).floor())
+            .collect();
+        states.dedup();
+        states
+    }
+}
+
+#[test]
+fn a_drive_runs_up_and_down_while_nothing_but_its_plc_moves_it() {
+    let mut line = Line::new(DRIVE);
+    line.slots[WANTED] = Slot::from_real(8192.0);
+    assert_eq!(line.drives(0x047E, 8), [64.0, 1.0]);
+    assert_eq!(line.drives(0x047F, 20), [1.0, 3.0, 7.0]);
+    assert_eq!(line.slots[NIST_A].real(), 8192.0);
+    assert_eq!(line.drives(0x047E, 30), [7.0, 3.0, 1.0]);
+    assert_eq!(line.slots[NIST_A].real(), 0.0);
+    line.drives(0x047F, 20);
+    line.slots[HOT] = Slot::from_real(1.0);
+    assert_eq!(line.drives(0x047F, 4), [72.0]);
+    line.slots[HOT] = Slot::from_real(0.0);
+    assert_eq!(line.drives(0x047E, 4), [72.0]);
+    assert_eq!(line.drives(0x04FE, 8), [72.0, 1.0]);
+}
+
+#[test]
+fn the_speed_that_a_simulation_writes_is_that_of_the_drive() {
+    logged::expect("Fan.NIST_A");
+    let mut line = Line::new(DRIVE);
+    line.drives(0x047E, 8);
+    line.drives(0x047F, 8);
+    line.slots[NIST_A] = Slot::from_real(1000.0);
+    line.drives(0x047F, 4);
+    assert_eq!(
+        line.drives(0x047E, 40),
+        [7.0, 3.0],
+        "it waits for standstill"
+    );
+    line.slots[NIST_A] = Slot::from_real(0.0);
+    assert_eq!(line.drives(0x047E, 4), [1.0]);
+}

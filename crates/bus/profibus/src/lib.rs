@@ -35,4 +35,5 @@ pub use gsd::{DiagnosisArea, DiagnosisTexts, Gsd, GsdError, Module, Slot};
 pub use options::{Device, Options, StationOptions};
 pub use segment::{Heard, Segment, Taken};
 pub use station::{Diagnosed, Identity, Process, State, Station};
+pub use tickbus_fieldbus::faults::AlarmKind;
 pub use user_parameters::{Allowed, Parameter, ParameterBlock, ParameterKind, UserParameters};

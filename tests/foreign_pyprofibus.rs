@@ -183,6 +183,7 @@ fn records() -> Result<(), Absent> {
         "[driver]\nid = 1\nname = \"Drive 4\"\n[fieldbus]\nkind = \"profibus-device\"\ndevice = \"{port}\"\n\
          baud = 500000\nmax_tsdr = 16000\nmax_age = \"5s\"\naddress = 8\n\
          ident = 0x80E1\nconfig = [0xF1]\nrecords = [\"slot 0 record 10 = 01 02\"]\n\
+         identity = {{ manufacturer = 42, serial = \"T-C1\" }}\n\
          parameters = [\"945 Unsigned16 = 1355 0 0 0 0 0 0 0\"]\n\
          [[signal]]\nname = \"out\"\naddress = \"%QD0\"\ntype = \"UDINT\"\n\
          [[signal]]\nname = \"in\"\naddress = \"%ID0\"\ntype = \"UDINT\"\n\
@@ -231,8 +232,8 @@ fn records() -> Result<(), Absent> {
         "5f010a0112 df80b100".to_owned(),
         "5f000a020102 5f000a02".to_owned(),
         "5f00ff040800fde8 5f00ff04".to_owned(),
-        // I&M0: "ident 80E1", "station 8".
-        "5e00ff44 5e00ff440800fde80000000000000000000000006964656e7420383045312020202020202020202073746174696f6e20382020\
+        // I&M0: 42, "ident 80E1", "T-C1".
+        "5e00ff44 5e00ff440800fde800000000000000000000002a6964656e74203830453120202020202020202020542d433120202020202020\
          20202020200001560100000000f60000000101000e"
             .to_owned(),
         // The examples of a maker's manuals: eight faults are read, and a time is changed to 12.15.
@@ -339,10 +340,11 @@ fn drives() -> Result<(), Absent> {
     let text = format!(
         "[driver]\nid = 1\nname = \"Drive\"\n[fieldbus]\nkind = \"profibus-device\"\ndevice = \"{port}\"\n\
          baud = 500000\nmax_tsdr = 16000\nmax_age = \"5s\"\naddress = 8\nident = 0x80E1\nconfig = [0xF1]\n\
-         parameters = [\"2000 FloatingPoint = 1500\", \"1120 FloatingPoint = 1\"]\n\
+         parameters = [\"2000 FloatingPoint = 1500\", \"1120 FloatingPoint = 1\", \"2050 Unsigned16 = %QW0 %QW2\",\n\
+         \"2053 Unsigned16 = %IW0 %IW2\"]\n\
          [[signal]]\nname = \"hot\"\naddress = \"%IX4.0\"\n\
          [fieldbus.at]\nhot = \"slot 0 record 100 %IX0.0\"\n\
-         [[drive]]\nname = \"Spindle\"\ntelegram = 1\nreference_speed = 1500\nfault = \"hot\"\n\
+         [[drive]]\nname = \"Spindle\"\ntelegram = 1\nreference_speed = 1500\nfault = \"hot\"\nwarning = \"hot\"\n\
          ramp_up = \"1s\"\nramp_down = \"1s\"\nquick_stop = \"200ms\"\ncoast = \"300ms\"\n"
     );
     write_gsd(folder.path(), &text, own);
@@ -363,7 +365,8 @@ fn drives() -> Result<(), Absent> {
         machine.set("hot", f64::from(u8::from((wanted - 375.0).abs() < 1.0)));
         fastest.set(fastest.get().max(machine.get("Spindle.NIST_A")));
     });
-    let parameters = "5e002ff0 5e002f1001010102080144bb800008013f800000";
+    // p2000 and p1120; r2050 and r2053, as after OFF3 and ON, which is no way out of S1.
+    let parameters = "5e002ff0 5e002f1c01010104080144bb800008013f8000000602047f40000602e3700000";
     assert!(told.contains(parameters), "{told}");
     assert!(told.contains("profibus_drive: ok"), "{told}");
     assert_eq!(fastest.get(), 1500.0, "{told}");

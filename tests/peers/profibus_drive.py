@@ -60,7 +60,7 @@ def main():
     # A fault, which is acknowledged by an edge once its cause is gone.
     drive.write(0x047F, QUARTER, 0x004F, 0x0048)
     drive.write(0x04FE, QUARTER, 0x004F, 0x0048)
-    drive.write(0x047E, 0, 0x004F, 0x0048)
+    drive.write(0x047E, 0, 0x00CF, 0x0048)  # no warning: a tick of the machine has seen these words
     drive.write(0x04FE, 0, 0x004F, 0x0001)
     drive.write(0x047E, WHOLE, 0x004F, 0x0001)
     drive.write(0x047F, WHOLE, 0x0107, 0x0107, WHOLE)
@@ -68,7 +68,8 @@ def main():
     within("OFF3", drive.write(0x047B, WHOLE, 0x007F, 0x0050, 0), 0.15, 0.9)
     drive.write(0x047F, WHOLE, 0x007F, 0x0070)
     ms1, server = DpTelegram.SSAP_MS1, DpTelegram.DSAP_SERVER
-    drive.ask(ms1, server, "5f002f10" "01010102" "100007d00000" "100004600000")
+    addresses = ["100007d00000", "100004600000", "100208020000", "100208050000"]
+    drive.ask(ms1, server, "5f002f1c" "01010104" + "".join(addresses))
     drive.ask(ms1, server, "5e002ff0")
     drive.master.destroy()
     print("profibus_drive: ok")

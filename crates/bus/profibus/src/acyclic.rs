@@ -114,7 +114,7 @@ impl Server {
             is_enabled: false,
             answer: Vec::new(),
             called: Called::default(),
-            connections: Connections::new(own.connections, own.send_timeout),
+            connections: Connections::new(own.connections, own.send_timeout, own.room()),
             records: Records::new(own, slots),
             acknowledgement: Vec::new(),
             alarms: Alarms::new(own.alarms),

@@ -239,8 +239,10 @@ impl Process for Machine<'_> {
         self.port.count("profibus-device.records_read");
         // The line is up: a request has come over it.
         if let Some(mut frames) = self.port.look(index..index + 1, now) {
-            let (layout, _) = &self.stations.all[index].records[record];
+            let side = &self.stations.all[index];
+            let (layout, _) = &side.records[record];
             layout.fill(frames.frame(index), octets);
+            layout.reflect(&side.frame, octets);
         }
     }
 

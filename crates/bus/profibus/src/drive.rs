@@ -5,15 +5,19 @@ use std::str::FromStr;
 
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::shown;
-use tickbus_image::signal::{Area, Signal};
+use tickbus_image::signal::{Address, Addressing, Area, Signal};
 
 use crate::acyclic::{ELEMENT_LIMIT, Format, Parameter};
 use crate::layout::{Move, Place, format_of};
 use crate::records::RecordLayout;
 
-/// A parameter as in `parameters` of a station: `945 Unsigned16 = 1355 0 0`.
+/// A parameter as in `parameters` of a station: `945 Unsigned16 = 1355 0 0`, or `2053 Unsigned16 = %IW0 %IW2`.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct FixedParameter(pub(crate) Parameter);
+pub(crate) struct FixedParameter {
+    parameter: Parameter,
+    /// The elements that are words of the image, which masters only read.
+    seen: Vec<(usize, Address)>,
+}
 
 impl FromStr for FixedParameter {
     type Err = Mistake;
@@ -48,23 +52,36 @@ impl FromStr for FixedParameter {
                 format!("write 1 to {ELEMENT_LIMIT}"),
             ));
         }
-        let mut octets = Vec::new();
-        for value in values {
+        let (mut octets, mut seen) = (Vec::new(), Vec::new());
+        for (element, value) in values.iter().enumerate() {
+            if value.starts_with('%') {
+                let address = Address::parse(value, Addressing::Bytes)?;
+                if address.bits().len() != 8 * format.octets() {
+                    return Err(Mistake::new(
+                        format!("{address} has not the size of {name}"),
+                        format!("write an address of {} bytes", format.octets()),
+                    ));
+                }
+                seen.push((element, address));
+                octets.resize(octets.len() + format.octets(), 0);
+                continue;
+            }
             let read = octets_of(value, format).ok_or_else(|| {
                 Mistake::new(
                     format!("\"{}\" is no {name}", shown(value)),
-                    "write a number in its range",
+                    "write a number in its range, or the address of a word of the image such as %IW0",
                 )
             })?;
             octets.extend(read);
         }
-        Ok(Self(Parameter {
+        let parameter = Parameter {
             number,
             format,
             is_array: values.len() > 1,
             octets,
-            is_writable: true,
-        }))
+            is_writable: seen.is_empty(),
+        };
+        Ok(Self { parameter, seen })
     }
 }
 
@@ -89,23 +106,42 @@ fn octets_of(text: &str, format: Format) -> Option<Vec<u8>> {
         .then(|| all[all.len() - format.octets()..].to_vec())
 }
 
-/// The parameters of a station: the fixed ones, and those with signals, each with its offset in the driver.cfg.
+/// The parameters of a station: the fixed ones, and those with signals, each with its offset in the driver.cfg. The image
+/// of the station has these bytes of inputs and of outputs.
 ///
 /// # Errors
 ///
-/// Two share a number, or two signals an element; or the formats of one parameter differ.
+/// A word is beyond the image, two share a number, or two signals an element; or the formats of one parameter differ.
 pub(crate) fn parameters<'s>(
     fixed: &[(FixedParameter, usize)],
     signals: impl Iterator<Item = &'s Signal>,
     places: &BTreeMap<String, (Place, usize)>,
+    sizes: [usize; 2],
 ) -> Result<Vec<(Parameter, RecordLayout)>, (usize, Mistake)> {
     let mut all: Vec<(Parameter, RecordLayout)> = Vec::new();
-    for (FixedParameter(own), at) in fixed {
+    for (fixed, at) in fixed {
+        let own = &fixed.parameter;
         if all.iter().any(|(other, _)| other.number == own.number) {
             let what = format!("parameter {} is there twice", own.number);
             return Err((*at, Mistake::new(what, "remove one of the two")));
         }
-        all.push((own.clone(), RecordLayout::default()));
+        let mut layout = RecordLayout::default();
+        for (element, address) in &fixed.seen {
+            let bits = address.bits();
+            let size = sizes[usize::from(address.area == Area::Output)];
+            if bits.end > 8 * size {
+                let what = format!("{address} lies beyond the {size} bytes of {}", address.area);
+                let right = "take an address of a signal, or of a word of a drive";
+                return Err((*at, Mistake::new(what, right)));
+            }
+            let begin = 8 * element * own.format.octets();
+            let wire = Move {
+                image: bits.start,
+                wire: begin..begin + bits.len(),
+            };
+            layout.show(address.area, wire);
+        }
+        all.push((own.clone(), layout));
     }
     let mut taken: Vec<(&str, u16, usize)> = Vec::new();
     for signal in signals {
@@ -164,14 +200,8 @@ pub(crate) fn parameters<'s>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tickbus_image::signal::{Address, DataType};
-
-    fn signal(name: &str, address: &str, data_type: DataType) -> Signal {
-        let address: Address = address.parse().expect("right");
-        let mut signal = Signal::new(name, address.area, address.byte, data_type);
-        signal.bit = address.bit;
-        signal
-    }
+    use crate::layout::signal;
+    use tickbus_image::signal::DataType;
 
     fn read(
         fixed: &[&str],
@@ -186,7 +216,7 @@ mod tests {
         let places = places.map(|(at, (signal, place))| {
             (signal.name.clone(), (place.parse().expect("a place"), at))
         });
-        parameters(&fixed, signals.iter(), &places.collect())
+        parameters(&fixed, signals.iter(), &places.collect(), [4, 4])
     }
 
     #[test]
@@ -215,6 +245,34 @@ mod tests {
         bit.take(&[1], &mut frame);
         assert_eq!(frame, [0x41, 0x48, 0, 0, 8]);
         assert_eq!((jog.format, jog.is_array), (Format::Boolean, true));
+    }
+
+    #[test]
+    fn words_of_the_image_are_parameters_that_are_read() {
+        let all = read(
+            &["2053 Unsigned16 = %IW2 7", "2050 Unsigned32 = %QD0"],
+            &[],
+            &[],
+        );
+        let all = all.expect("right");
+        let [(sent, inputs), (received, outputs)] = &all[..] else {
+            panic!("{all:?}");
+        };
+        assert!(!sent.is_writable && !received.is_writable);
+        let mut octets = sent.octets.clone();
+        inputs.fill(&[1, 2, 3, 4], &mut octets);
+        assert_eq!(octets, [3, 4, 0, 7]);
+        let mut octets = received.octets.clone();
+        outputs.reflect(&[1, 2, 3, 4], &mut octets);
+        assert_eq!(octets, [1, 2, 3, 4]);
+        let mut frame = [9; 4];
+        outputs.take(&octets, &mut frame);
+        assert_eq!(frame, [9; 4], "nobody writes them");
+        let (at, mistake) = read(&["1 Unsigned16 = %IW3"], &[], &[]).expect_err("beyond");
+        assert_eq!(
+            (at, &*mistake.what),
+            (7, "%IW3 lies beyond the 4 bytes of %I")
+        );
     }
 
     #[test]
@@ -260,6 +318,9 @@ mod tests {
             "1 Boolean = 2",
             "1 FloatingPoint = inf",
             "1 FloatingPoint = x",
+            "1 Unsigned16 = %IB0",
+            "1 Unsigned16 = %IX0.0",
+            "1 Unsigned16 = %",
         ] {
             assert!(text.parse::<FixedParameter>().is_err(), "{text}");
         }

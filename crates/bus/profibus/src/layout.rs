@@ -7,6 +7,7 @@ use std::str::FromStr;
 
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::shown;
+use tickbus_fieldbus::copy_bits;
 use tickbus_image::signal::{Address, Addressing, Area, DataType, Signal};
 
 use crate::acyclic::{ELEMENT_LIMIT, Format};
@@ -267,7 +268,7 @@ impl Layout {
         };
         wire.fill(0);
         for own in moves {
-            copy(frame, own.image, wire, own.wire.start, own.wire.len());
+            copy_bits(frame, own.image, own.wire.len(), wire, own.wire.start);
         }
     }
 
@@ -278,7 +279,7 @@ impl Layout {
         };
         frame.fill(0);
         for own in moves {
-            copy(wire, own.wire.start, frame, own.image, own.wire.len());
+            copy_bits(wire, own.wire.start, own.wire.len(), frame, own.image);
         }
         frame
     }
@@ -294,28 +295,18 @@ impl Layout {
     }
 }
 
-/// Copies a signal: a bit, or whole bytes.
-pub(crate) fn copy(from: &[u8], source: usize, to: &mut [u8], target: usize, bits: usize) {
-    if bits == 1 {
-        let bit = from[source / 8] >> (source % 8) & 1;
-        let octet = &mut to[target / 8];
-        *octet = *octet & !(1 << (target % 8)) | bit << (target % 8);
-        return;
-    }
-    let (source, target, bytes) = (source / 8, target / 8, bits / 8);
-    to[target..target + bytes].copy_from_slice(&from[source..source + bytes]);
+/// Signals for tests.
+#[cfg(test)]
+pub(crate) fn signal(name: &str, address: &str, data_type: DataType) -> Signal {
+    let address: Address = address.parse().expect("right");
+    let mut signal = Signal::new(name, address.area, address.byte, data_type);
+    signal.bit = address.bit;
+    signal
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn signal(name: &str, address: &str, data_type: DataType) -> Signal {
-        let address: Address = address.parse().expect("right");
-        let mut signal = Signal::new(name, address.area, address.byte, data_type);
-        signal.bit = address.bit;
-        signal
-    }
 
     /// Two words in, one word out, one word in and a byte out.
     fn modules() -> Configuration {

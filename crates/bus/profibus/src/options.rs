@@ -1,6 +1,7 @@
 //! The bus's section of a driver.cfg.
 
 mod details;
+mod identity;
 mod machine;
 mod station;
 
@@ -371,7 +372,7 @@ impl Options {
             station.check_records(identity, at)?;
         }
         let own = &mut identity.acyclic;
-        own.nameplate.serial = format!("station {}", station.address);
+        (station.identity).complete(station.address, &mut own.nameplate);
         own.send_timeout = send_timeout(self.line.settings.baud);
         let signals = table.signals.iter();
         let (slots, room) = (identity.configuration.slots(), own.room());
@@ -386,7 +387,9 @@ impl Options {
         own.records = records;
         let signals = table.signals.iter();
         let signals = signals.filter(|signal| signal.station == index);
-        let all = parameters(&station.parameters, signals, &self.places)?;
+        let image = &table.stations[index];
+        let sizes = [image.input_bytes, image.output_bytes];
+        let all = parameters(&station.parameters, signals, &self.places, sizes)?;
         let (parameters, more): (Vec<_>, Vec<_>) = all.into_iter().unzip();
         own.parameters = parameters;
         layouts.extend(more);

@@ -5,10 +5,11 @@ use std::str::FromStr;
 
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::shown;
+use tickbus_fieldbus::copy_bits;
 use tickbus_image::signal::{Area, Signal};
 
 use crate::acyclic::{RECORD_LIMIT, Record};
-use crate::layout::{Move, Place, copy};
+use crate::layout::{Move, Place};
 
 /// The index of the record that has the device's nameplate.
 const NAMEPLATE: u8 = 255;
@@ -58,6 +59,8 @@ impl FromStr for Fixed {
 pub(crate) struct RecordLayout {
     inputs: Vec<Move>,
     outputs: Vec<Move>,
+    /// Outputs that are shown, and not written.
+    shown: Vec<Move>,
 }
 
 impl RecordLayout {
@@ -69,17 +72,32 @@ impl RecordLayout {
         }
     }
 
+    /// Adds bits of the image that masters read, of either area.
+    pub(crate) fn show(&mut self, area: Area, own: Move) {
+        match area {
+            Area::Input => self.inputs.push(own),
+            Area::Output => self.shown.push(own),
+        }
+    }
+
+    /// Copies the outputs that are shown from the frame of the image into the record.
+    pub(crate) fn reflect(&self, frame: &[u8], octets: &mut [u8]) {
+        for own in &self.shown {
+            copy_bits(frame, own.image, own.wire.len(), octets, own.wire.start);
+        }
+    }
+
     /// Copies the inputs from the frame of the image into the record.
     pub(crate) fn fill(&self, frame: &[u8], octets: &mut [u8]) {
         for own in &self.inputs {
-            copy(frame, own.image, octets, own.wire.start, own.wire.len());
+            copy_bits(frame, own.image, own.wire.len(), octets, own.wire.start);
         }
     }
 
     /// Copies the outputs from the record into the frame of the image.
     pub(crate) fn take(&self, octets: &[u8], frame: &mut [u8]) {
         for own in &self.outputs {
-            copy(octets, own.wire.start, frame, own.image, own.wire.len());
+            copy_bits(octets, own.wire.start, own.wire.len(), frame, own.image);
         }
     }
 }
@@ -184,14 +202,8 @@ pub(crate) fn records<'s>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tickbus_image::signal::{Address, DataType};
-
-    fn signal(name: &str, address: &str, data_type: DataType) -> Signal {
-        let address: Address = address.parse().expect("right");
-        let mut signal = Signal::new(name, address.area, address.byte, data_type);
-        signal.bit = address.bit;
-        signal
-    }
+    use crate::layout::signal;
+    use tickbus_image::signal::DataType;
 
     fn fixed(text: &str) -> (Fixed, usize) {
         (text.parse().expect("a record"), 7)

@@ -4,7 +4,7 @@ use tickbus_base::time::Nanos;
 
 use super::pdu::{Refusal, function, refuse};
 use super::records::Called;
-use super::{Peer, RECORD_LIMIT, Reply};
+use super::{Peer, Reply};
 
 /// The access point of the first connection; the others have those below.
 const HIGHEST_SAP: u8 = 48;
@@ -38,6 +38,8 @@ pub(super) struct Connections {
     all: Vec<Option<Connection>>,
     /// `Send_Timeout` in units of 10 ms.
     send_timeout: u16,
+    /// The most octets of a record.
+    room: u8,
 }
 
 #[derive(Debug)]
@@ -68,10 +70,11 @@ impl Connection {
 }
 
 impl Connections {
-    pub(super) fn new(count: u8, send_timeout: u16) -> Self {
+    pub(super) fn new(count: u8, send_timeout: u16, room: usize) -> Self {
         Self {
             all: (0..count.min(HIGHEST_SAP)).map(|_| None).collect(),
             send_timeout: send_timeout.max(1),
+            room: u8::try_from(room).expect("at most 240"),
         }
     }
 
@@ -105,7 +108,7 @@ impl Connections {
             let answer = match Initiate::read(request) {
                 Ok(initiate) => {
                     send_timeout = send_timeout.max(initiate.send_timeout);
-                    Ok(initiate.answer())
+                    Ok(initiate.answer(self.room))
                 }
                 Err(why) => Err(why),
             };
@@ -248,8 +251,7 @@ impl<'a> Initiate<'a> {
     }
 
     /// The answer that accepts the connection: the addresses change places.
-    fn answer(&self) -> Vec<u8> {
-        let room = u8::try_from(RECORD_LIMIT).expect("240");
+    fn answer(&self, room: u8) -> Vec<u8> {
         let mut answer = vec![function::INITIATE, room];
         answer.extend(FEATURES);
         answer.extend([0, 0]); // Profile_Features_Supported

@@ -1,7 +1,6 @@
 //! The parameters of a drive, as the profile of drives has them: record 47 takes a request for several parameters, and
 //! then has the answer.
 
-use super::RECORD_LIMIT;
 use super::machine::Machine;
 use super::pdu::Refusal;
 
@@ -125,12 +124,13 @@ struct Address {
     subindex: u16,
 }
 
-/// Serves a request; returns the answer that the master reads next. `first` is the number of the first parameter among
-/// the records of the machine.
+/// Serves a request; returns the answer that the master reads next, of at most `limit` octets. `first` is the number of
+/// the first parameter among the records of the machine.
 pub(super) fn serve(
     request: &[u8],
     all: &mut [Parameter],
     first: usize,
+    limit: usize,
     machine: &mut impl Machine,
 ) -> Result<Vec<u8>, Refusal> {
     let (&[reference, service, axis, count], rest) =
@@ -161,7 +161,7 @@ pub(super) fn serve(
         };
         // Room for the errors of all parameters that follow.
         let reserved = HEAD + ERROR * (usize::from(count) - number - 1);
-        let room = RECORD_LIMIT.saturating_sub(reserved + blocks.len());
+        let room = limit.saturating_sub(reserved + blocks.len());
         let served = if service == READ {
             read(&address, all, first, room, machine, &mut blocks)
         } else if is_lost {
@@ -277,6 +277,7 @@ fn change(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::acyclic::RECORD_LIMIT;
 
     #[derive(Default)]
     struct Kept {
@@ -316,7 +317,7 @@ mod tests {
     }
 
     fn serve(all: &mut [Parameter], machine: &mut Kept, request: &[u8]) -> Vec<u8> {
-        super::serve(request, all, 100, machine).expect("a request")
+        super::serve(request, all, 100, RECORD_LIMIT, machine).expect("a request")
     }
 
     /// "Reading the fault buffer" of the manuals of SINAMICS S120 and DCM.
@@ -416,7 +417,7 @@ mod tests {
             &[1, 2, 0, 1, 0x10, 1, 0, 10, 0, 0],
             &[1, 2, 0, 1, 0x10, 1, 0, 10, 0, 0, 5, 1],
         ] {
-            let served = super::serve(request, &mut parameters(), 100, &mut machine);
+            let served = super::serve(request, &mut parameters(), 100, RECORD_LIMIT, &mut machine);
             assert_eq!(served, Err(Refusal::Range), "{request:02X?}");
         }
         // The values of the second parameter are missing: the first one stays, too.
@@ -424,7 +425,7 @@ mod tests {
             1, 2, 0, 2, 0x10, 1, 0, 10, 0, 0, 0x10, 1, 0, 10, 0, 1, 5, 1, 9, 0,
         ];
         let mut all = parameters();
-        let served = super::serve(&request, &mut all, 100, &mut machine);
+        let served = super::serve(&request, &mut all, 100, RECORD_LIMIT, &mut machine);
         assert_eq!((served, all), (Err(Refusal::Range), parameters()));
         assert_eq!(machine.written, []);
         let mut request = vec![1, 1, 0, 39];

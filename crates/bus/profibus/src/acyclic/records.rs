@@ -36,6 +36,8 @@ pub(super) struct Records {
     identification: Identification,
     /// The highest slot.
     slots: u8,
+    /// The most octets of a record.
+    room: usize,
 }
 
 impl Records {
@@ -45,6 +47,7 @@ impl Records {
             parameters: own.parameters.clone(),
             identification: Identification::new(&own.nameplate),
             slots,
+            room: own.room(),
         }
     }
 
@@ -62,7 +65,7 @@ impl Records {
                 self.read(slot, index, length, called, machine, &mut answer)
             }
             [function::WRITE, slot, index, length, ref data @ ..] if length > 0 => {
-                if data.len() == length.into() {
+                if data.len() == length.into() && data.len() <= self.room {
                     self.write(slot, index, data, called, machine)
                         .map(|()| answer.extend([service, slot, index, length]))
                 } else {
@@ -108,7 +111,7 @@ impl Records {
             machine.read(own, &mut octets);
             octets
         };
-        octets.truncate(length.into());
+        octets.truncate(self.room.min(length.into()));
         let length = u8::try_from(octets.len()).expect("a record has at most 240 octets");
         answer.extend([function::READ, slot, index, length]);
         answer.append(&mut octets);
@@ -132,7 +135,13 @@ impl Records {
         if self.is_drive(index) {
             self.check_slot(slot)?;
             called.parameters.clear();
-            called.parameters = drive::serve(data, &mut self.parameters, self.all.len(), machine)?;
+            called.parameters = drive::serve(
+                data,
+                &mut self.parameters,
+                self.all.len(),
+                self.room,
+                machine,
+            )?;
             return Ok(());
         }
         let own = self.position(slot, index)?;

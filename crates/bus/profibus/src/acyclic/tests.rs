@@ -347,3 +347,59 @@ fn what_is_no_request_ends_the_connection_with_a_reason() {
         assert_eq!(serve(&mut server, &[]), Reply::Closed);
     }
 }
+
+#[test]
+fn a_device_with_little_room_cuts_what_is_read_and_refuses_what_is_written() {
+    let own = Acyclic {
+        class_1: true,
+        connections: 1,
+        max_data: 32,
+        records: vec![Record {
+            slot: 1,
+            index: 1,
+            octets: vec![1; 32],
+            is_writable: true,
+        }],
+        parameters: vec![Parameter {
+            number: 10,
+            format: Format::Unsigned8,
+            is_array: true,
+            octets: vec![5; 32],
+            is_writable: false,
+        }],
+        ..Acyclic::default()
+    };
+    let (mut server, mut machine) = (Server::new(&own, 1), Kept::default());
+    server.reset(true);
+    // The nameplate has 68 octets.
+    ask(
+        &mut server,
+        &mut machine,
+        &[0x5F, 0, 255, 4, 8, 0, 0xFD, 0xE8],
+    );
+    let read = ask(&mut server, &mut machine, &[0x5E, 0, 255, 240]);
+    assert_eq!((read[3], read.len()), (32, 36));
+    let mut write = vec![0x5F, 1, 1, 33];
+    write.resize(4 + 33, 0);
+    let refused = [0xDF, 128, 0xB1, 0];
+    assert_eq!(ask(&mut server, &mut machine, &write), refused);
+    // 27 values do not fit behind the heads of the answer, 26 do.
+    for (elements, expected) in [
+        (27, &[0x81, 0, 1, 0x44, 1, 0, 0x15][..]),
+        (26, &[1, 0, 1, 5, 26]),
+    ] {
+        let request = [0x5F, 0, 47, 10, 7, 1, 0, 1, 0x10, elements, 0, 10, 0, 0];
+        ask(&mut server, &mut machine, &request);
+        let answer = ask(&mut server, &mut machine, &[0x5E, 0, 47, 240]);
+        assert_eq!(answer[5..5 + expected.len()], *expected, "{elements}");
+        assert!(answer.len() <= 36);
+    }
+    assert!(matches!(
+        server.open(Nanos(0), MASTER, &INITIATE),
+        Reply::Data(_)
+    ));
+    let Reply::Data(answer) = server.class_2(Nanos(0), MASTER, 48, &[], &mut machine) else {
+        panic!("no answer");
+    };
+    assert_eq!(answer[..2], [0x57, 32]);
+}

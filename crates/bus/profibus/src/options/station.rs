@@ -9,6 +9,7 @@ use tickbus_base::toml_text::{Key, Shape, Table, Value};
 use tickbus_image::signal;
 
 use super::Keys;
+use super::identity::{IDENTITY_KEYS, StatedIdentity, read_identity};
 use crate::acyclic::{Acyclic, AlarmSupport, Nameplate, PARAMETERS};
 use crate::configuration::Configuration;
 use crate::drive::FixedParameter;
@@ -69,6 +70,11 @@ pub(crate) const KEYS: &[Key] = &[
         "Parameters of a drive with values, such as \"945 Unsigned16 = 1355 0 0\"",
     ),
     Key::new(
+        "identity",
+        Shape::Table(IDENTITY_KEYS),
+        "The nameplate of the device (I&M)",
+    ),
+    Key::new(
         "config",
         Shape::List(&Shape::Whole(0, 255), 1, DATA_LIMIT),
         "Beside \"ident\": the identifiers of the modules",
@@ -87,6 +93,7 @@ pub(crate) const OWN_KEYS: &[Key] = &[
     KEYS[4],
     KEYS[5],
     KEYS[6],
+    KEYS[7],
 ];
 
 /// The keys of one station.
@@ -100,6 +107,8 @@ pub struct StationOptions {
     pub(super) records: Vec<(Fixed, usize)>,
     /// The parameters of a drive with their values, each with its offset.
     pub(super) parameters: Vec<(FixedParameter, usize)>,
+    /// The nameplate, as far as it is stated.
+    pub(super) identity: StatedIdentity,
     /// The offset of the address, and the line.
     pub(super) at: usize,
     pub(super) line: usize,
@@ -298,7 +307,16 @@ pub(super) fn read_station(table: &mut Table<'_>, is_required: bool) -> Keys {
     let config = table.take("config");
     let records = table.take("records");
     let parameters = table.take("parameters");
-    let others = [&gsd, &modules, &ident, &config, &records, &parameters];
+    let identity = table.take("identity");
+    let others = [
+        &gsd,
+        &modules,
+        &ident,
+        &config,
+        &records,
+        &parameters,
+        &identity,
+    ];
     if !is_required && address.is_none() {
         let Some(stray) = others.into_iter().flatten().next() else {
             return Keys::Absent;
@@ -370,13 +388,17 @@ pub(super) fn read_station(table: &mut Table<'_>, is_required: bool) -> Keys {
     let parameters = parameters.map_or(Some(Vec::new()), |value| {
         read_texts(&value, "parameters", "945 Unsigned16 = 1355 0 0")
     });
-    match (address, device, records, parameters) {
-        (Some(address), Some(device), Some(records), Some(parameters)) => {
+    let identity = identity.map_or(Some(StatedIdentity::default()), |value| {
+        read_identity(&value)
+    });
+    match (address, device, records, parameters, identity) {
+        (Some(address), Some(device), Some(records), Some(parameters), Some(identity)) => {
             Keys::Right(StationOptions {
                 address,
                 device,
                 records,
                 parameters,
+                identity,
                 at,
                 line,
                 gsd_at,

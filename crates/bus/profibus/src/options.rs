@@ -80,13 +80,13 @@ enum Keys {
     Absent,
     /// The keys have mistakes, which are reported.
     Wrong,
-    Right(StationOptions),
+    Right(Box<StationOptions>),
 }
 
 impl Keys {
     fn right(&self) -> Option<&StationOptions> {
         match self {
-            Self::Right(options) => Some(options),
+            Self::Right(options) => Some(&**options),
             Self::Absent | Self::Wrong => None,
         }
     }

@@ -107,17 +107,18 @@ pub struct OffsetAllocator<'a> {
 
 impl<'a> OffsetAllocator<'a> {
     /// Allocates the two structures of an axis or a drive: at the offsets of its table, or right after the preceding
-    /// one.
+    /// one. `least` are the bytes that have to fit behind a stated offset.
     fn take(
         &mut self,
         station: Option<&Value<'a>>,
         offsets: &[Option<Value<'a>>; 2],
         bytes: [usize; 2],
+        least: [usize; 2],
     ) -> (Option<usize>, Option<usize>) {
         let key = station.and_then(Value::as_text).unwrap_or("");
         let free = self.free.entry(key).or_default();
-        let command = offset_of(offsets[0].as_ref(), free.0, bytes[0]);
-        let feedback = offset_of(offsets[1].as_ref(), free.1, bytes[1]);
+        let command = offset_of(offsets[0].as_ref(), free.0, least[0]);
+        let feedback = offset_of(offsets[1].as_ref(), free.1, least[1]);
         *free = (
             command.unwrap_or(free.0) + bytes[0],
             feedback.unwrap_or(free.1) + bytes[1],
@@ -233,7 +234,7 @@ pub fn read<'a>(
         FEEDBACK_BYTES
     };
     let bytes = [COMMAND_BYTES, feedback_bytes];
-    let (command, feedback) = places.take(station.as_ref(), &offsets, bytes);
+    let (command, feedback) = places.take(station.as_ref(), &offsets, bytes, bytes);
     let (command, feedback) = (command?, feedback?);
     let ((name, value), kind) = (named?, kind?);
     let end = (command + COMMAND_BYTES).max(feedback + feedback_bytes);
@@ -276,10 +277,7 @@ pub fn read<'a>(
         offsets: &offsets,
         station: station.as_ref(),
         number,
-        ends: [
-            axis.command + COMMAND_BYTES,
-            axis.feedback + axis.feedback_bytes,
-        ],
+        ends: [command + COMMAND_BYTES, feedback + feedback_bytes],
     };
     let mut sections: Vec<Section<'a>> = signals.map(|signal| structures.section(signal)).collect();
     for (_, mut section) in switches {

@@ -159,12 +159,12 @@ impl Alarms {
             }
             is_enabled
         });
-        let waits = |own: &Message| match self.most {
-            Some(most) => self.unacknowledged.len() < most,
-            None => {
-                let mut others = self.unacknowledged.iter();
-                others.all(|other| other.alarm.kind != own.alarm.kind)
+        let waits = |own: &Message| {
+            if let Some(most) = self.most {
+                return self.unacknowledged.len() < most;
             }
+            let mut others = self.unacknowledged.iter();
+            others.all(|other| other.alarm.kind != own.alarm.kind)
         };
         let Some(place) = self.waiting.iter().position(waits) else {
             return false;

@@ -31,7 +31,7 @@ pub(super) const IDENTITY_KEYS: &[Key] = &[
 /// The parts of the nameplate that the file states.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct StatedIdentity {
-    manufacturer: Option<u16>,
+    manufacturer: u16,
     order: Option<String>,
     serial: Option<String>,
 }
@@ -41,7 +41,7 @@ impl StatedIdentity {
     pub(super) fn complete(&self, address: u8, nameplate: &mut Nameplate) {
         let own = self.clone();
         nameplate.serial = own.serial.unwrap_or_else(|| format!("station {address}"));
-        nameplate.manufacturer = own.manufacturer.unwrap_or(nameplate.manufacturer);
+        nameplate.manufacturer = own.manufacturer;
         if let Some(order) = own.order {
             nameplate.order = order;
         }
@@ -64,12 +64,10 @@ pub(super) fn read_identity(value: &Value<'_>) -> Option<StatedIdentity> {
         let text = value.label(longest, "write the text in quotes")?;
         Some(Some(text.to_owned()))
     };
-    let manufacturer = match manufacturer {
-        None => Some(None),
-        Some(value) => value
-            .whole(0..=u16::MAX.into())
-            .map(|number| u16::try_from(number).ok()),
-    };
+    let manufacturer = manufacturer.map_or(Some(0), |value| {
+        let number = value.whole(0..=u16::MAX.into())?;
+        u16::try_from(number).ok()
+    });
     let (order, serial) = (text(order, ORDER), text(serial, SERIAL));
     Some(StatedIdentity {
         manufacturer: manufacturer?,

@@ -342,7 +342,38 @@ pub(super) fn read_station(table: &mut Table<'_>, is_required: bool) -> Keys {
     let at = address.as_ref().map_or(table.at(), Value::at);
     let address = address.and_then(|value| value.whole(0..=125));
     let address = address.and_then(|address| u8::try_from(address).ok());
-    let device = match (gsd, ident) {
+    let device = read_device(table, at, [gsd, modules, ident, config]);
+    let records = records.map_or(Some(Vec::new()), |value| {
+        read_texts(&value, "records", "slot 2 record 10 = 00 64")
+    });
+    let parameters = parameters.map_or(Some(Vec::new()), |value| {
+        read_texts(&value, "parameters", "945 Unsigned16 = 1355 0 0")
+    });
+    let identity = identity.map_or(Some(StatedIdentity::default()), |value| {
+        read_identity(&value)
+    });
+    match (address, device, records, parameters, identity) {
+        (Some(address), Some(device), Some(records), Some(parameters), Some(identity)) => {
+            Keys::Right(Box::new(StationOptions {
+                address,
+                device,
+                records,
+                parameters,
+                identity,
+                at,
+                line,
+                gsd_at,
+                modules_at,
+            }))
+        }
+        _ => Keys::Wrong,
+    }
+}
+
+/// The device that the keys `gsd`, `modules`, `ident` and `config` say.
+fn read_device(table: &Table<'_>, at: usize, keys: [Option<Value<'_>>; 4]) -> Option<Device> {
+    let [gsd, modules, ident, config] = keys;
+    match (gsd, ident) {
         (Some(gsd), ident) => {
             let file = gsd.label(PATH_LIMIT, "name the device's GSD file");
             let modules = modules.map_or(Some(Vec::new()), |value| read_modules(&value));
@@ -381,31 +412,6 @@ pub(super) fn read_station(table: &mut Table<'_>, is_required: bool) -> Keys {
             }
             None
         }
-    };
-    let records = records.map_or(Some(Vec::new()), |value| {
-        read_texts(&value, "records", "slot 2 record 10 = 00 64")
-    });
-    let parameters = parameters.map_or(Some(Vec::new()), |value| {
-        read_texts(&value, "parameters", "945 Unsigned16 = 1355 0 0")
-    });
-    let identity = identity.map_or(Some(StatedIdentity::default()), |value| {
-        read_identity(&value)
-    });
-    match (address, device, records, parameters, identity) {
-        (Some(address), Some(device), Some(records), Some(parameters), Some(identity)) => {
-            Keys::Right(StationOptions {
-                address,
-                device,
-                records,
-                parameters,
-                identity,
-                at,
-                line,
-                gsd_at,
-                modules_at,
-            })
-        }
-        _ => Keys::Wrong,
     }
 }
 

@@ -85,6 +85,10 @@ struct Task {
 }
 
 #[derive(Clone, Debug, PartialEq)]
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "bits of the status words, independent of each other"
+)]
 pub(super) struct Positioner {
     own: Mechanics,
     place: Place,
@@ -194,7 +198,6 @@ impl Positioner {
             return;
         }
         match mode {
-            Mode::None => {}
             Mode::Mdi | Mode::SetUp => self.take_over(edges, words, pos),
             Mode::Jog => {
                 let sign = if jogs[0] { -1.0 } else { 1.0 };
@@ -210,7 +213,7 @@ impl Positioner {
                 self.is_referenced = false;
                 self.begin(Aim::Position(0.0), HOMING, self.own.rates);
             }
-            Mode::Homing => {}
+            Mode::None | Mode::Homing => {}
         }
     }
 

@@ -22,8 +22,14 @@ const VELOCITY: f64 = 30_000.0;
 const ACCELERATION: f64 = 100.0;
 const UNITS_PER_TURN: f64 = 10_000.0;
 
-/// A condition, or several that hold together.
-const CONDITIONS: Shape = Shape::Any(&[Shape::Text, Shape::List(&Shape::Text, 1, 100)]);
+/// The shape of a condition, of a list of conditions that must all hold, or of signals and their values.
+pub const CONDITIONS: Shape = Shape::Any(&[Shape::Text, Shape::List(&Shape::Text, 1, 100), VALUES]);
+
+/// The shape of signals and their values.
+pub const VALUES: Shape = Shape::Map(&Shape::Any(&[Shape::Number, Shape::Boolean]));
+
+/// The bytes of the shortest telegram.
+const LEAST: usize = 4;
 
 const CODE: Shape = Shape::Whole(1, u16::MAX as i128);
 
@@ -52,12 +58,12 @@ pub const KEYS: &[Key] = &[
     STATION_KEY,
     Key::new(
         "command_offset",
-        Shape::Whole(0, AREA_LIMIT as i128),
+        Shape::Whole(0, (AREA_LIMIT - LEAST) as i128),
         "The first byte of the telegram in %Q; right behind the axis or drive before it if it is left out",
     ),
     Key::new(
         "feedback_offset",
-        Shape::Whole(0, AREA_LIMIT as i128),
+        Shape::Whole(0, (AREA_LIMIT - LEAST) as i128),
         "The first byte of the telegram in %I; right behind the axis or drive before it if it is left out",
     ),
     Key::new(
@@ -201,26 +207,9 @@ pub fn read<'a>(
         })?;
         u16::try_from(code).ok()
     });
-    for (condition, code) in conditions.iter().zip(&codes) {
-        if let (None, Some(code)) = (condition, code) {
-            code.wrong(
-                "this code stands without its condition",
-                "add it, such as fault = \"Motor is hot\", or remove the code",
-            );
-        }
-    }
+    check_codes(&conditions, &codes);
     if let Some(telegram) = telegram {
-        let has_encoder = matches!(telegram, Telegram::Encoder | Telegram::Servo);
-        let has_positioner = telegram == Telegram::Positioner;
-        let mut stray = Vec::new();
-        stray.extend(increments.as_ref().filter(|_| !has_encoder));
-        stray.extend(of_positioner.iter().flatten().filter(|_| !has_positioner));
-        for value in stray {
-            value.wrong(
-                format!("telegram {} does not use this key", telegram.number()),
-                "remove it, or write another telegram",
-            );
-        }
+        check_use(telegram, increments.as_ref(), &of_positioner);
     }
     let increments = increments.map_or(Some(INCREMENTS.into()), |value| {
         value.whole(1..=u32::MAX.into())
@@ -234,7 +223,7 @@ pub fn read<'a>(
 
     let telegram = telegram?;
     let bytes = telegram.bytes();
-    let (command, feedback) = places.take(station.as_ref(), &offsets, bytes);
+    let (command, feedback) = places.take(station.as_ref(), &offsets, bytes, [LEAST; 2]);
     let (command, feedback) = (command?, feedback?);
     let (name, value) = named?;
     let ends = [command + bytes[0], feedback + bytes[1]];
@@ -284,6 +273,37 @@ pub fn read<'a>(
         conditions,
         sections,
     })
+}
+
+/// Reports codes of conditions that do not exist.
+fn check_codes(conditions: &[Option<Value<'_>>; 2], codes: &[Option<Value<'_>>; 2]) {
+    let keys = ["fault", "warning"].into_iter();
+    for (key, (condition, code)) in keys.zip(conditions.iter().zip(codes)) {
+        if let (None, Some(code)) = (condition, code) {
+            code.wrong(
+                format!("\"{key}_code\" stands without \"{key}\""),
+                format!("add {key} = \"Motor is hot\", or remove the code"),
+            );
+        }
+    }
+}
+
+/// Reports keys that the telegram does not use.
+fn check_use(
+    telegram: Telegram,
+    increments: Option<&Value<'_>>,
+    of_positioner: &[Option<Value<'_>>],
+) {
+    let has_encoder = matches!(telegram, Telegram::Encoder | Telegram::Servo);
+    let has_positioner = telegram == Telegram::Positioner;
+    let stray = increments.filter(|_| !has_encoder).into_iter();
+    let of_positioner = of_positioner.iter().flatten();
+    for value in stray.chain(of_positioner.filter(|_| !has_positioner)) {
+        value.wrong(
+            format!("telegram {} does not use this key", telegram.number()),
+            "remove it, or write another telegram",
+        );
+    }
 }
 
 fn read_telegram(value: &Value<'_>) -> Option<Telegram> {

@@ -1,15 +1,10 @@
 //! The keys of a `[[reply]]` section, and the kinds of replies that have them.
 
+use tickbus_axis::section::drives::{CONDITIONS, VALUES};
 use tickbus_base::toml_text::{Key, RequiredKey, Shape, TableKind, kind_names};
 use tickbus_image::signal::section::{NAME_LIMIT, TWO_NUMBERS};
 
 use crate::behaviour::RULE;
-
-/// A condition, or a list of conditions that must all hold, or signals and their values.
-const CONDITIONS: Shape = Shape::Any(&[Shape::Text, Shape::List(&Shape::Text, 1, 100), VALUES]);
-
-/// Signals and their values.
-const VALUES: Shape = Shape::Map(&Shape::Any(&[Shape::Number, Shape::Boolean]));
 
 const fn key(name: &'static str, shape: Shape, right: &'static str) -> RequiredKey {
     RequiredKey { name, shape, right }

@@ -88,7 +88,7 @@ fn check_names(validator: &Validator, document: &Value, table: &Table) {
 fn is_foreign(mistakes: &Mistakes) -> bool {
     mistakes.iter().all(|found| {
         let what = &found.mistake.what;
-        let is_of_kind = ["a fault of kind ", "a reply of kind "];
+        let is_of_kind = ["a fault of kind ", "a reply of kind ", "telegram "];
         is_of_kind.iter().any(|head| what.starts_with(head))
             || what.contains("\" stands without \"")
     })
@@ -169,7 +169,10 @@ fn wrong(shape: &Shape) -> Vec<Value> {
             vec![json!("§"), json!("")]
         }
         Shape::Whole(least, most) => whole(&[least - 1, most.saturating_add(1)]),
-        Shape::Numbers(numbers) => whole(&[i128::from(numbers[0]) + 1]),
+        Shape::Numbers(numbers) => {
+            let most = numbers.iter().max().copied().unwrap_or_default();
+            whole(&[i128::from(most) + 1])
+        }
         Shape::List(element, least, most) => {
             let few = least.checked_sub(1).and_then(|few| list(element, few));
             let many = Some(most).filter(|most| *most < 1_000);

@@ -256,12 +256,17 @@ fn read_diagnosis(keys: &Keys<'_>, table: &SignalTable, whole: bool) -> Option<D
     let is_static = keys.static_.as_ref().map_or(Some(false), Value::boolean);
     let alarm = keys.alarm.as_ref();
     let alarm = alarm.map(|alarm| alarm.choice("types of alarms", &AlarmKind::ALL));
-    let slots = if alarm.is_some() {
-        0..=ALARM_SLOT_LIMIT
-    } else {
-        1..=DIAGNOSIS_LIMIT
-    };
-    let slot = keys.slot.as_ref().map(|slot| small(slot, slots));
+    let slot = keys.slot.as_ref().map(|value| {
+        let slot = small(value, 0..=ALARM_SLOT_LIMIT)?;
+        if alarm.is_none() && !(1..=DIAGNOSIS_LIMIT).contains(&slot.into()) {
+            value.wrong(
+                format!("slot {slot} is beyond those of a diagnosis"),
+                format!("name a slot from 1 to {DIAGNOSIS_LIMIT}; those of alarms are 0 to {ALARM_SLOT_LIMIT}"),
+            );
+            return None;
+        }
+        Some(slot)
+    });
     let channel = keys.channel.as_ref();
     let channel = channel.map(|channel| small(channel, 0..=DIAGNOSIS_LIMIT - 1));
     let error = keys.error.as_ref();

@@ -17,7 +17,9 @@ mod columns;
 mod compare;
 mod completions;
 mod dispatch;
+mod doctor;
 mod export;
+mod find;
 mod fmu_helper;
 mod gsd;
 mod host;
@@ -76,7 +78,9 @@ enum Command {
     Compare(compare::Arguments),
     Completions(completions::Arguments),
     Dispatch(dispatch::Arguments),
+    Doctor(doctor::Arguments),
     Export(export::Arguments),
+    Find(find::Arguments),
     Gsd(gsd::Arguments),
     Import(import::Arguments),
     Latency(latency::Arguments),
@@ -161,7 +165,9 @@ fn run(kinds: &'static Kinds) -> Outcome {
         Command::Compare(arguments) => compare::run(&arguments, kinds),
         Command::Completions(arguments) => completions::run(&arguments),
         Command::Dispatch(arguments) => dispatch::run(&arguments),
+        Command::Doctor(arguments) => doctor::run(&arguments, kinds),
         Command::Export(arguments) => export::run(&arguments, kinds),
+        Command::Find(arguments) => find::run(&arguments, kinds),
         Command::Gsd(arguments) => gsd::run(&arguments, kinds),
         Command::Import(arguments) => import::run(&arguments, kinds),
         Command::Latency(arguments) => latency::run(&arguments),

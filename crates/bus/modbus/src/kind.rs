@@ -6,14 +6,43 @@ use crate::tls_options::Tls;
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Key, Table};
+use tickbus_fieldbus::examine::{Complaint, Examination, Search};
 use tickbus_fieldbus::faults::AnswerCodes;
 use tickbus_fieldbus::tcp::Writers;
 use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, CYCLE, NamedFile, OpenError, Role};
 use tickbus_image::signal::{Signal, SignalTable};
 use tickbus_net::Address;
 
-use super::{ClientOptions, Line, ModbusClient, ModbusServer, ServerOptions, keys, tls};
+use super::{ClientOptions, Line, ModbusClient, ModbusServer, ServerOptions, client, keys, tls};
 use crate::tls::{ClientSide, ServerSide};
+
+/// What the counters of a server say about its clients.
+const COMPLAINTS: &[Complaint] = &[
+    Complaint {
+        counter: "modbus-server.unknown_unit",
+        cause: "wrong-unit",
+        what: "the PLC asks for a unit that no station has",
+        next: "write the same unit in the PLC and in the driver.cfg; without \"unit\" a single station answers every unit",
+    },
+    Complaint {
+        counter: "modbus-server.illegal_data_address",
+        cause: "address-refused",
+        what: "the PLC asks for elements that do not exist here",
+        next: "compare its addresses and lengths with those of tickbus check FILE",
+    },
+    Complaint {
+        counter: "modbus-server.illegal_function",
+        cause: "function-refused",
+        what: "the PLC uses a function that does not exist here, or may not write",
+        next: "let the PLC use functions 1 to 6, 15, 16, 22 or 23",
+    },
+    Complaint {
+        counter: "modbus-server.illegal_data_value",
+        cause: "request-refused",
+        what: "the PLC sends requests with a wrong length or value",
+        next: "compare its lengths with those of tickbus check FILE",
+    },
+];
 
 impl BusKind for ServerOptions {
     const NAME: &'static str = "modbus-server";
@@ -90,11 +119,28 @@ impl BusOptions for ServerOptions {
     fn place(&self, signal: &Signal, _table: &SignalTable) -> String {
         self.place(signal)
     }
+
+    fn examine(&self, examination: &mut Examination<'_>) {
+        match &self.line {
+            Line::Tcp(address) | Line::RtuOverTcp(address) => {
+                if examination.can_listen(address) {
+                    examination.sizes("the PLC asks for what it needs");
+                }
+            }
+            Line::Udp(_) => examination.unexamined("Modbus over UDP"),
+            Line::Serial(_) => examination.unexamined("a serial line"),
+        }
+    }
+
+    fn complaints(&self) -> &'static [Complaint] {
+        COMPLAINTS
+    }
 }
 
 impl BusKind for ClientOptions {
     const NAME: &'static str = "modbus-client";
     const CAN_OBSERVE: bool = true;
+    const SEARCH: Option<Search> = Some(client::SEARCH);
     const KEYS: &'static [&'static [Key]] = &[keys::LINE, keys::CLIENT];
     const STATION_KEYS: &'static [Key] = keys::POLLED_STATION;
 
@@ -160,6 +206,10 @@ impl BusOptions for ClientOptions {
 
     fn requests(&self, table: &SignalTable) -> Vec<String> {
         self.shown_requests(table)
+    }
+
+    fn examine(&self, examination: &mut Examination<'_>) {
+        self.examine(examination);
     }
 
     fn both_ways(&self, table: &SignalTable) -> Vec<(usize, usize)> {

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use tickbus_base::Mistake;
 use tickbus_base::time::{Nanos, Stop};
+use tickbus_fieldbus::examine::Wire;
 use tickbus_fieldbus::tcp::{Call, Caller};
 use tickbus_fieldbus::{BusError, OpenError, Port};
 use tickbus_net::{Address, Stream};
@@ -50,6 +51,10 @@ pub(crate) fn call<S: Stream>(
     _port: &mut Port,
     _stop: &Stop,
 ) -> Result<(), BusError> {
+    match side.0 {}
+}
+
+pub(crate) fn open(side: &ClientSide, _wire: Wire) -> Result<Wire, (&'static str, String)> {
     match side.0 {}
 }
 

@@ -3,6 +3,7 @@
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Key, Table, shown};
+use tickbus_fieldbus::examine::{Examination, Search};
 use tickbus_fieldbus::faults::{AnswerCodes, WrongAnswer};
 use tickbus_fieldbus::tcp::Writers;
 use tickbus_fieldbus::{
@@ -10,7 +11,7 @@ use tickbus_fieldbus::{
 };
 use tickbus_image::signal::{Signal, SignalTable};
 
-use super::{ClientOptions, S7Client, S7Server, ServerOptions, Variable, keys};
+use super::{ClientOptions, S7Client, S7Server, ServerOptions, Variable, client, keys};
 
 impl BusKind for ServerOptions {
     const NAME: &'static str = "s7-server";
@@ -93,11 +94,18 @@ impl BusOptions for ServerOptions {
         let variable = self.variables.get(&signal.name);
         variable.map_or_else(String::new, Variable::to_string)
     }
+
+    fn examine(&self, examination: &mut Examination<'_>) {
+        if examination.can_listen(&self.address) {
+            examination.sizes("the PLC asks for what it needs");
+        }
+    }
 }
 
 impl BusKind for ClientOptions {
     const NAME: &'static str = "s7-client";
     const CAN_OBSERVE: bool = true;
+    const SEARCH: Option<Search> = Some(client::SEARCH);
     const KEYS: &'static [&'static [Key]] = &[keys::CLIENT];
     const STATION_KEYS: &'static [Key] = keys::POLLED_STATION;
 
@@ -166,6 +174,10 @@ impl BusOptions for ClientOptions {
 
     fn requests(&self, table: &SignalTable) -> Vec<String> {
         self.shown_requests(table)
+    }
+
+    fn examine(&self, examination: &mut Examination<'_>) {
+        self.examine(examination);
     }
 
     fn both_ways(&self, table: &SignalTable) -> Vec<(usize, usize)> {

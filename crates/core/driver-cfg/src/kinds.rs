@@ -4,6 +4,7 @@
 use std::fmt;
 
 use tickbus_base::toml_text::{Table, Value, did_you_mean, shown};
+use tickbus_fieldbus::examine::Search;
 use tickbus_fieldbus::{BusKind, BusOptions, Events, Role};
 use tickbus_plc::Programs;
 
@@ -17,6 +18,7 @@ type ReadOptions = fn(Role, bool, &mut Table<'_>) -> Option<Box<dyn BusOptions>>
 #[derive(Clone, Copy)]
 pub struct Kind {
     keys: KindKeys,
+    search: Option<Search>,
     read: ReadOptions,
 }
 
@@ -32,6 +34,7 @@ impl Kind {
                 one_of: K::ONE_OF,
                 station_keys: K::STATION_KEYS,
             },
+            search: K::SEARCH,
             read: |role, moved, table| {
                 let options = K::read(role, moved, table)?;
                 Some(Box::new(options))
@@ -122,6 +125,13 @@ impl Kinds {
                 all.push(*keys);
             }
         }
+        all
+    }
+
+    /// Returns how the servers of the buses are found, for each bus whose servers can be.
+    pub fn searches(&self) -> Vec<Search> {
+        let mut all = self.others.map(Self::searches).unwrap_or_default();
+        all.extend(self.buses.iter().filter_map(|kind| kind.search));
         all
     }
 

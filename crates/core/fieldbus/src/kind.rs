@@ -11,6 +11,7 @@ use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_base::toml_text::{Collector, Key, Table};
 use tickbus_image::signal::{Signal, SignalTable};
 
+use super::examine::{Complaint, Examination, Search};
 use super::faults::AnswerCodes;
 use super::{At, Bus, Events, Role};
 
@@ -210,6 +211,16 @@ pub trait BusOptions: AnyOptions {
         Vec::new()
     }
 
+    /// Examines the line step by step, without writing anything into a PLC.
+    fn examine(&self, examination: &mut Examination<'_>) {
+        examination.unexamined("a line of this kind");
+    }
+
+    /// The counters of a server that show what its clients do wrong.
+    fn complaints(&self) -> &'static [Complaint] {
+        &[]
+    }
+
     /// The pairs of a signal that is written and one that is read at the same place, by their positions in the table.
     fn both_ways(&self, table: &SignalTable) -> Vec<(usize, usize)> {
         let _ = table;
@@ -238,6 +249,9 @@ pub trait BusKind: BusOptions + Sized {
 
     /// The keys that [`read_station`](BusOptions::read_station) takes.
     const STATION_KEYS: &'static [Key] = &[];
+
+    /// How the servers of this bus are found, for a kind that connects to them.
+    const SEARCH: Option<Search> = None;
 
     /// Reads the keys of this kind in `[fieldbus]`, for the end with `role`, and reports their mistakes. `moved` means
     /// that [another address](BusOptions::set_address) will follow.

@@ -22,6 +22,7 @@ mod traffic;
 mod validity;
 mod write_guard;
 
+pub mod examine;
 pub mod faults;
 pub mod loopback;
 pub mod tcp;

@@ -140,7 +140,7 @@ fn wait(stream: &TcpStream, set: &mut PollSet, clock: &dyn Clock, stop: &Stop) -
 }
 
 /// Refuses a socket that connected to itself, which happens if the system chooses the destination port for this end.
-fn not_itself(own: SocketAddr, peer: SocketAddr) -> io::Result<()> {
+pub(crate) fn not_itself(own: SocketAddr, peer: SocketAddr) -> io::Result<()> {
     if own == peer {
         return Err(ErrorKind::ConnectionRefused.into());
     }
@@ -148,7 +148,7 @@ fn not_itself(own: SocketAddr, peer: SocketAddr) -> io::Result<()> {
 }
 
 /// Starts to connect; does not wait.
-fn begin(address: SocketAddr) -> io::Result<net::TcpStream> {
+pub(crate) fn begin(address: SocketAddr) -> io::Result<net::TcpStream> {
     let socket = Socket::new(
         Domain::for_address(address),
         Type::STREAM,

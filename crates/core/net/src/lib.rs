@@ -7,6 +7,7 @@
 //! | [`connect()`], [`reach`], [`Dialler`] | connecting: with a stop, blocking, again and again |
 //! | [`listen()`], [`bind`] | listening: with a stop, at once |
 //! | [`bind_udp`], [`Datagrams`] | datagrams over UDP |
+//! | [`look_up`], [`route`], [`try_connect`], [`sweep`] | finding out which addresses answer, and why others do not |
 //! | [`Acceptor`] | accepting clients in a poll set |
 //! | [`prepare`], [`close_gracefully`], … | what every connection needs from the system |
 //! | [`begins_like_browser`] | distinguishing a web browser from a peer |
@@ -24,6 +25,7 @@ mod error;
 mod listen;
 mod local_address;
 mod message;
+mod reachable;
 mod resolve;
 pub mod serial;
 mod stream;
@@ -38,5 +40,6 @@ pub use error::Error;
 pub use listen::{bind, listen};
 pub use local_address::LocalAddress;
 pub use message::{Inbox, Message, WireError};
+pub use reachable::{Limits, Swept, Unreachable, look_up, route, sweep, try_connect};
 pub use stream::{Stream, close_by_reset, close_gracefully, is_for_later, prepare, watch_peer};
 pub use udp::{Datagrams, bind_udp};

@@ -2,9 +2,11 @@
 
 mod area_mapping;
 mod at;
+mod examine;
 mod options;
 mod plan;
 mod request;
+mod search;
 mod session;
 
 use std::net::SocketAddr;
@@ -24,6 +26,7 @@ pub(crate) use area_mapping::{PART_KEYS, PARTS};
 pub use options::ClientOptions;
 pub use plan::{Capabilities, queries};
 pub use request::{AnswerError, Region, Request};
+pub(crate) use search::SEARCH;
 use session::{ClientSession, Framing, Station};
 
 /// The time for a server to acknowledge sent data, as a multiple of `max_age`.

@@ -2,6 +2,7 @@
 
 mod accepted;
 mod called;
+mod examined;
 mod files;
 mod reason;
 mod role;
@@ -22,6 +23,7 @@ use crate::restricts::Restricts;
 use crate::tls_options::Tls;
 use accepted::TlsService;
 use called::TlsCaller;
+pub(crate) use examined::open;
 use files::Files;
 
 /// The certificates of a server, for its clients.

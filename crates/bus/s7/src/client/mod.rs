@@ -1,6 +1,7 @@
 //! The bus of kind `s7-client`: reads and writes the memory of a CPU.
 
 mod connection;
+mod examine;
 mod frames;
 mod in_flight;
 mod options;
@@ -17,6 +18,7 @@ use tickbus_fieldbus::{BusError, CYCLE, Free, Medium, PlcState, Port, Role, Writ
 use tickbus_image::signal::SignalTable;
 
 use connection::Connection;
+pub(crate) use examine::SEARCH;
 pub use frames::FrameFields;
 pub use options::ClientOptions;
 pub(crate) use options::IDENTITY_LIMIT;

@@ -15,7 +15,7 @@ use tickbus_image::signal::{Area, Signal, SignalTable};
 use tickbus_net::Address;
 
 /// The local TSAP, as of libraries and programming devices.
-const CALLING: [u8; 2] = [1, 0];
+pub(super) const CALLING: [u8; 2] = [1, 0];
 
 /// The longest identity, in characters.
 pub(crate) const IDENTITY_LIMIT: usize = 200;

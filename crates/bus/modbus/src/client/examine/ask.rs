@@ -1,0 +1,197 @@
+//! Single questions to a device, one after another on a connection that blocks.
+
+use std::fmt;
+
+use crate::identification::{READ_DEVICE_IDENTIFICATION, Taken};
+use crate::mbap::{self, Telegram};
+use crate::{Exception, Function, Identification, rtu};
+use tickbus_fieldbus::examine::{Wire, WireEnd};
+
+use super::super::request::{AnswerError, Request, expect, length};
+
+/// The framing of telegrams in a stream.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::client) enum Frame {
+    /// With the header of TCP.
+    Tcp,
+    /// As RTU, with a checksum.
+    Rtu,
+}
+
+/// Why there is no answer.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(in crate::client) enum Miss {
+    /// There is none, or the connection has ended.
+    End(WireEnd),
+    /// The bytes are no telegram of this framing.
+    Alien(Vec<u8>),
+    /// The device answers with an exception.
+    Refused(Exception),
+    /// The answer violates the standard.
+    Malformed(String),
+}
+
+impl fmt::Display for Miss {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::End(end) => end.fmt(f),
+            Self::Alien(bytes) => {
+                let first = &bytes[..bytes.len().min(16)];
+                write!(f, "answers with bytes that are no Modbus telegram ({first:02X?})")
+            }
+            Self::Refused(exception) => write!(f, "answers {exception}"),
+            Self::Malformed(why) => f.write_str(why),
+        }
+    }
+}
+
+/// The most answers to a request for an identity, as of the polling client.
+const IDENTIFYING: usize = 8;
+
+/// A conversation with the units behind one connection.
+pub(in crate::client) struct Talk {
+    wire: Wire,
+    frame: Frame,
+    transaction: u16,
+    inbox: Vec<u8>,
+}
+
+impl Talk {
+    pub(in crate::client) fn new(wire: Wire, frame: Frame) -> Self {
+        Self {
+            wire,
+            frame,
+            transaction: 0,
+            inbox: Vec::new(),
+        }
+    }
+
+    /// Sends a PDU, and returns that of the answer, which may be an exception.
+    fn exchange(&mut self, unit: u8, pdu: &[u8]) -> Result<Vec<u8>, Miss> {
+        let mut request = Vec::new();
+        let copy = |to: &mut Vec<u8>| to.extend_from_slice(pdu);
+        self.transaction = self.transaction.wrapping_add(1);
+        match self.frame {
+            Frame::Tcp => mbap::append(self.transaction, unit, &mut request, copy),
+            Frame::Rtu => rtu::append(unit, &mut request, copy),
+        }
+        // A telegram that came too late for its question is none of this one.
+        self.inbox.clear();
+        self.wire.send(&request).map_err(Miss::End)?;
+        let deadline = self.wire.deadline();
+        loop {
+            if let Some(answer) = self.take(unit, pdu[0])? {
+                return Ok(answer);
+            }
+            self.wire.receive(&mut self.inbox, deadline).map_err(Miss::End)?;
+        }
+    }
+
+    /// The PDU of the awaited answer, if it has arrived. Drops other telegrams.
+    fn take(&mut self, unit: u8, code: u8) -> Result<Option<Vec<u8>>, Miss> {
+        loop {
+            let (taken, answer) = match self.frame {
+                Frame::Tcp => match Telegram::parse(&self.inbox) {
+                    Err(_) => return Err(Miss::Alien(self.inbox.clone())),
+                    Ok(None) => return Ok(None),
+                    Ok(Some((telegram, taken))) => {
+                        let is_it = telegram.transaction == self.transaction;
+                        (taken, is_it.then(|| telegram.pdu.to_vec()))
+                    }
+                },
+                Frame::Rtu => match rtu::split(&self.inbox, length) {
+                    Err(_) => return Err(Miss::Alien(self.inbox.clone())),
+                    Ok(None) => return Ok(None),
+                    Ok(Some((from, pdu, taken))) => {
+                        let is_it = from == unit && pdu[0] & 0x7F == code;
+                        (taken, is_it.then(|| pdu.to_vec()))
+                    }
+                },
+            };
+            self.inbox.drain(..taken);
+            if answer.is_some() {
+                return Ok(answer);
+            }
+        }
+    }
+
+    /// Reads elements into `receives`. The request must not write.
+    pub(in crate::client) fn read(
+        &mut self,
+        unit: u8,
+        request: &Request,
+        receives: &mut [u8],
+    ) -> Result<(), Miss> {
+        debug_assert!(request.write().is_none(), "an examination writes nothing");
+        let mut pdu = Vec::new();
+        request.append(&[], &mut pdu);
+        let answer = self.exchange(unit, &pdu)?;
+        request.take(&pdu, &answer, receives).map_err(miss)
+    }
+
+    /// The identity by function 43, or else by function 17.
+    pub(in crate::client) fn identity(&mut self, unit: u8) -> Result<Identification, Miss> {
+        match self.identification(unit) {
+            Err(Miss::Refused(exception)) if exception.is_about_the_request() => {
+                let code = Function::ReportServerId.code();
+                let answer = self.exchange(unit, &[code])?;
+                let data = expect(Function::ReportServerId, &answer).map_err(miss)?;
+                let text = data.get(1..).unwrap_or_default();
+                Ok(Identification {
+                    server_id: Some(legible(text)),
+                    ..Identification::default()
+                })
+            }
+            known => known,
+        }
+    }
+
+    fn identification(&mut self, unit: u8) -> Result<Identification, Miss> {
+        const BASIC: u8 = 1;
+        let code = Function::DeviceIdentification.code();
+        let mut identification = Identification::default();
+        let mut object = 0;
+        for _ in 0..IDENTIFYING {
+            let pdu = [code, READ_DEVICE_IDENTIFICATION, BASIC, object];
+            let answer = self.exchange(unit, &pdu)?;
+            let data = expect(Function::DeviceIdentification, &answer).map_err(miss)?;
+            match identification.take(data) {
+                Some(Taken::Whole) => break,
+                Some(Taken::MoreFrom(next)) => object = next,
+                None => {
+                    return Err(Miss::Malformed(
+                        "gives a malformed answer when asked who it is".to_owned(),
+                    ));
+                }
+            }
+        }
+        Ok(identification)
+    }
+}
+
+fn miss(error: AnswerError) -> Miss {
+    match error {
+        AnswerError::Refused(exception) => Miss::Refused(exception),
+        AnswerError::Malformed(why) => Miss::Malformed(why),
+    }
+}
+
+/// The printable parts of a server id, whose format is the device's own.
+fn legible(bytes: &[u8]) -> String {
+    let texts = bytes.split(|byte| !matches!(byte, b' '..=b'~'));
+    let texts = texts.map(|text| String::from_utf8_lossy(text).trim().to_owned());
+    let texts: Vec<String> = texts.filter(|text| text.len() > 1).collect();
+    texts.join(" ")
+}
+
+/// The protocol that begins an answer with these bytes.
+pub(in crate::client) fn protocol(bytes: &[u8]) -> Option<&'static str> {
+    Some(match bytes {
+        [0x15 | 0x16, 3, ..] => "TLS",
+        [3, 0, ..] => "ISO on TCP, as S7 does",
+        [b'H', b'T', b'T', b'P', ..] | [b'<', ..] => "HTTP",
+        [b'S', b'S', b'H', b'-', ..] => "SSH",
+        [b'E', b'R', b'R', ..] | [b'A', b'C', b'K', ..] => "OPC UA",
+        _ => return None,
+    })
+}

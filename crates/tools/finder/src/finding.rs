@@ -1,0 +1,166 @@
+//! The search: connections at a bounded rate, and questions to those that accept one.
+
+use std::io;
+use std::net::SocketAddr;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
+
+use tickbus_base::time::{Clock, Nanos, Stop};
+use tickbus_base::toml_text::printable;
+use tickbus_fieldbus::examine::{Found, Peer, Search, Searching};
+use tickbus_net::{Limits, Swept, sweep};
+
+/// The time in which a port must accept a connection. Below one second this is a single packet, as systems repeat it
+/// after one second (RFC 6298, 2.1).
+const CONNECT: Nanos = Nanos::from_millis(900);
+
+/// The time in which a device must answer a question.
+const ANSWER: Nanos = Nanos::from_millis(500);
+
+/// How many devices are asked at the same time.
+const ASKED: usize = 64;
+
+/// A search.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// The buses, each with the port at which its servers are searched.
+    pub searches: Vec<(Search, u16)>,
+    /// The addresses with their ports.
+    pub addresses: Vec<SocketAddr>,
+    /// Connections per second.
+    pub rate: u32,
+    /// The Modbus units to ask; empty for the usual ones.
+    pub units: Vec<u8>,
+}
+
+/// One device that answered.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Device {
+    /// Its address.
+    pub address: SocketAddr,
+    /// The name of the bus.
+    pub bus: &'static str,
+    /// Its identity and further facts, without control characters.
+    pub found: Found,
+}
+
+/// The result of a search.
+#[derive(Clone, Debug, Default)]
+pub struct Findings {
+    /// The devices, by address and bus.
+    pub devices: Vec<Device>,
+    /// Ports that accept connections, but speak none of the buses.
+    pub unknown: Vec<SocketAddr>,
+    /// The connections that were tried.
+    pub swept: Swept,
+}
+
+/// Searches. Ends early, with what was found so far, at `stop`.
+///
+/// # Errors
+///
+/// The system cannot wait for sockets, or has no more files or threads.
+pub fn find(plan: &Plan, clock: &Arc<dyn Clock>, stop: &Stop) -> io::Result<Findings> {
+    let limits = Limits {
+        rate: plan.rate,
+        patience: CONNECT,
+    };
+    let devices = Mutex::new(Vec::new());
+    let unknown = Mutex::new(Vec::new());
+    let (sender, receiver) = std::sync::mpsc::channel();
+    let receiver = Mutex::new(receiver);
+    let work = || {
+        loop {
+            let next = receiver.lock().unwrap_or_else(PoisonError::into_inner).recv();
+            let Ok((address, stream)) = next else {
+                return;
+            };
+            let found = ask(plan, address, stream, clock);
+            if found.is_empty() {
+                unknown.lock().unwrap_or_else(PoisonError::into_inner).push(address);
+            } else {
+                devices.lock().unwrap_or_else(PoisonError::into_inner).extend(found);
+            }
+        }
+    };
+    let swept = thread::scope(|scope| {
+        for number in 0..ASKED.min(plan.addresses.len()) {
+            let builder = thread::Builder::new().name(format!("tickbus-ask-{number}"));
+            let spawned = builder.spawn_scoped(scope, work);
+            // One is enough to end; without any nobody would be asked.
+            if let (Err(error), 0) = (spawned, number) {
+                return Err(error);
+            }
+        }
+        let sender = sender;
+        sweep(plan.addresses.iter().copied(), limits, &**clock, stop, |address, stream| {
+            // The receivers live as long as this scope.
+            let _ = sender.send((address, stream));
+        })
+    })?;
+    let mut devices = devices.into_inner().unwrap_or_else(PoisonError::into_inner);
+    devices.sort_by(|a: &Device, b| (a.address, a.bus, &a.found.facts).cmp(&(b.address, b.bus, &b.found.facts)));
+    let mut unknown = unknown.into_inner().unwrap_or_else(PoisonError::into_inner);
+    unknown.sort_unstable();
+    Ok(Findings {
+        devices,
+        unknown,
+        swept,
+    })
+}
+
+/// Asks whether a port speaks one of the buses that are searched at it.
+fn ask(
+    plan: &Plan,
+    address: SocketAddr,
+    stream: std::net::TcpStream,
+    clock: &Arc<dyn Clock>,
+) -> Vec<Device> {
+    let peer = Peer::new(address, CONNECT, ANSWER, clock);
+    let mut first = Some(stream);
+    let at_port = plan.searches.iter().filter(|(_, port)| *port == address.port());
+    let mut searches: Vec<&Search> = at_port.map(|(search, _)| search).collect();
+    if searches.is_empty() {
+        // A target with a port of its own: whatever speaks there.
+        searches = plan.searches.iter().map(|(search, _)| search).collect();
+    }
+    for search in searches {
+        let wire = match first.take() {
+            Some(stream) => peer.over(stream),
+            None => peer.dial(),
+        };
+        let Ok(wire) = wire else {
+            return Vec::new();
+        };
+        let searching = Searching {
+            peer: peer.clone(),
+            wire,
+            units: &plan.units,
+        };
+        let found = (search.ask)(searching);
+        if !found.is_empty() {
+            let device = |found: Found| Device {
+                address,
+                bus: search.bus,
+                found: legible(found),
+            };
+            return found.into_iter().map(device).collect();
+        }
+    }
+    Vec::new()
+}
+
+/// Texts of a device as text: a terminal or a file must not take them for commands.
+fn legible(found: Found) -> Found {
+    let Found {
+        identity,
+        facts,
+        stanza,
+    } = found;
+    let facts = facts.into_iter().map(|(name, text)| (name, printable(&text)));
+    Found {
+        identity: printable(&identity),
+        facts: facts.collect(),
+        stanza: stanza.lines().map(|line| printable(line) + "\n").collect(),
+    }
+}

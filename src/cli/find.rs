@@ -1,0 +1,171 @@
+//! `tickbus find TARGET...`: who is on the network that the user names.
+
+use std::fmt::Write as _;
+use std::sync::Arc;
+
+use clap::builder::PossibleValuesParser;
+use serde_json::{Value, json};
+
+use super::columns::aligned;
+use super::json::{Format, print_document};
+use super::{Outcome, print};
+use tickbus_base::time::{Clock, Monotonic, Stop};
+use tickbus_driver_cfg::Kinds;
+use tickbus_finder::{Device, Findings, Plan, Target, addresses, find};
+
+/// Find the PLCs on a network: Modbus TCP, S7 and OPC UA.
+///
+/// Each address gets one connection per bus, and those that accept it are asked who they are. Nothing is written to anybody.
+/// Only the addresses that you name are searched: a name, an address, a range such as 192.168.0.0/24 or 192.168.0.5-20, each with
+/// a port behind a colon if it is not the usual one (not behind a slash).
+#[derive(Debug, clap::Args)]
+pub(super) struct Arguments {
+    /// The addresses to search.
+    #[arg(required = true, value_name = "TARGET", value_parser = target)]
+    targets: Vec<Target>,
+
+    /// Search for servers of these buses only [default: all].
+    #[arg(long, value_name = "BUS", value_delimiter = ',', value_parser = PossibleValuesParser::new(BUSES))]
+    bus: Vec<String>,
+
+    /// Search at this port instead of the usual ones (502, 102, 4840).
+    #[arg(long, value_name = "PORT", value_parser = clap::value_parser!(u16).range(1..))]
+    port: Option<u16>,
+
+    /// Ask these Modbus units [default: 1, 255 and 0, until one answers].
+    #[arg(long, value_name = "UNIT", value_delimiter = ',')]
+    unit: Vec<u8>,
+
+    /// Connect to this many addresses per second.
+    #[arg(long, value_name = "N", default_value_t = 500, value_parser = clap::value_parser!(u32).range(1..=2000))]
+    rate: u32,
+
+    /// Print a `[fieldbus]` table for each device.
+    #[arg(long, conflicts_with = "json")]
+    cfg: bool,
+
+    #[command(flatten)]
+    format: Format,
+}
+
+/// The names of the buses that can be searched.
+const BUSES: [&str; 3] = ["modbus", "s7", "opcua"];
+
+fn target(text: &str) -> Result<Target, String> {
+    text.parse().map_err(|mistake: tickbus_base::Mistake| mistake.to_string())
+}
+
+pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
+    let stop = Stop::new();
+    let handler = {
+        let stop = stop.clone();
+        move || stop.stop()
+    };
+    // Without it Ctrl-C ends the search without its findings so far.
+    let _ = ctrlc::set_handler(handler);
+    let clock: Arc<dyn Clock> = Monotonic::shared();
+    let is_wanted = |bus: &str| arguments.bus.is_empty() || arguments.bus.iter().any(|own| own == bus);
+    let searches = kinds.searches().into_iter().filter(|search| is_wanted(search.bus));
+    let searches: Vec<_> = searches
+        .map(|search| (search, arguments.port.unwrap_or(search.port)))
+        .collect();
+    let mut ports: Vec<u16> = searches.iter().map(|(_, port)| *port).collect();
+    ports.dedup();
+    let addresses = match addresses(&arguments.targets, &ports, &*clock, &stop) {
+        Ok(addresses) => addresses,
+        Err(error) => {
+            return arguments.format.fail("find", &format!("find: {error}"), Outcome::WrongInput);
+        }
+    };
+    let plan = Plan {
+        searches,
+        addresses,
+        rate: arguments.rate,
+        units: arguments.unit.clone(),
+    };
+    let findings = match find(&plan, &clock, &stop) {
+        Ok(findings) => findings,
+        Err(error) => {
+            return arguments.format.fail("find", &format!("find: {error}"), Outcome::BusFailed);
+        }
+    };
+    let outcome = if findings.devices.is_empty() { Outcome::BusFailed } else { Outcome::Done };
+    let printed = if arguments.format.is_json() {
+        print_document("find", document(&findings))
+    } else {
+        print("find", &report(&findings, arguments.cfg))
+    };
+    if printed == Outcome::Done { outcome } else { printed }
+}
+
+fn facts(device: &Device) -> String {
+    let facts = device.found.facts.iter().map(|(name, text)| format!("{name} {text}"));
+    facts.collect::<Vec<_>>().join(", ")
+}
+
+fn report(findings: &Findings, with_tables: bool) -> String {
+    let mut out = String::new();
+    let rows = findings.devices.iter().map(|device| {
+        let identity = match &*device.found.identity {
+            "" => "says nothing about itself",
+            identity => identity,
+        };
+        vec![
+            device.address.to_string(),
+            device.bus.to_owned(),
+            facts(device),
+            identity.to_owned(),
+        ]
+    });
+    let mut rows: Vec<Vec<String>> = rows.collect();
+    rows.extend(findings.unknown.iter().map(|address| {
+        let what = "accepts connections, and speaks none of these buses".to_owned();
+        vec![address.to_string(), "?".to_owned(), String::new(), what]
+    }));
+    if !rows.is_empty() {
+        out.push_str(&aligned(&["address", "bus", "where", "identity"], &rows));
+        out.push('\n');
+    }
+    if with_tables {
+        for device in &findings.devices {
+            // Writing to a string cannot fail.
+            let _ = writeln!(out, "# {} {}\n{}", device.address, device.found.identity, device.found.stanza);
+        }
+    }
+    let swept = findings.swept;
+    let _ = writeln!(
+        out,
+        "find: devices={} tried={} refused={} silent={} unreachable={}",
+        findings.devices.len(),
+        swept.attempts,
+        swept.refused,
+        swept.silent,
+        swept.failed
+    );
+    out
+}
+
+fn document(findings: &Findings) -> Value {
+    let devices = findings.devices.iter().map(|device| {
+        let facts = device.found.facts.iter();
+        json!({
+            "address": device.address.ip().to_string(),
+            "port": device.address.port(),
+            "bus": device.bus,
+            "identity": device.found.identity,
+            "facts": facts.map(|(name, text)| ((*name).to_owned(), json!(text))).collect::<serde_json::Map<_, _>>(),
+            "fieldbus": device.found.stanza,
+        })
+    });
+    let swept = findings.swept;
+    json!({
+        "ok": !findings.devices.is_empty(),
+        "reason": findings.devices.is_empty().then_some("no device was found"),
+        "devices": devices.collect::<Value>(),
+        "unknown": findings.unknown.iter().map(ToString::to_string).collect::<Value>(),
+        "tried": swept.attempts,
+        "refused": swept.refused,
+        "silent": swept.silent,
+        "unreachable": swept.failed,
+    })
+}

@@ -72,7 +72,13 @@ fn report(steps: &[Step]) -> String {
     let mut out = String::new();
     for step in steps {
         // Writing to a string cannot fail.
-        let _ = writeln!(out, "{:4}  {:9}  {}", step.verdict.name(), step.name, step.evidence);
+        let _ = writeln!(
+            out,
+            "{:4}  {:9}  {}",
+            step.verdict.name(),
+            step.name,
+            step.evidence
+        );
         for detail in &step.details {
             let _ = writeln!(out, "{:17}{detail}", "");
         }

@@ -52,7 +52,8 @@ pub(super) struct Arguments {
 const BUSES: [&str; 3] = ["modbus", "s7", "opcua"];
 
 fn target(text: &str) -> Result<Target, String> {
-    text.parse().map_err(|mistake: tickbus_base::Mistake| mistake.to_string())
+    text.parse()
+        .map_err(|mistake: tickbus_base::Mistake| mistake.to_string())
 }
 
 pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
@@ -64,8 +65,12 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
     // Without it Ctrl-C ends the search without its findings so far.
     let _ = ctrlc::set_handler(handler);
     let clock: Arc<dyn Clock> = Monotonic::shared();
-    let is_wanted = |bus: &str| arguments.bus.is_empty() || arguments.bus.iter().any(|own| own == bus);
-    let searches = kinds.searches().into_iter().filter(|search| is_wanted(search.bus));
+    let is_wanted =
+        |bus: &str| arguments.bus.is_empty() || arguments.bus.iter().any(|own| own == bus);
+    let searches = kinds
+        .searches()
+        .into_iter()
+        .filter(|search| is_wanted(search.bus));
     let searches: Vec<_> = searches
         .map(|search| (search, arguments.port.unwrap_or(search.port)))
         .collect();
@@ -74,7 +79,9 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
     let addresses = match addresses(&arguments.targets, &ports, &*clock, &stop) {
         Ok(addresses) => addresses,
         Err(error) => {
-            return arguments.format.fail("find", &format!("find: {error}"), Outcome::WrongInput);
+            return arguments
+                .format
+                .fail("find", &format!("find: {error}"), Outcome::WrongInput);
         }
     };
     let plan = Plan {
@@ -86,20 +93,34 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
     let findings = match find(&plan, &clock, &stop) {
         Ok(findings) => findings,
         Err(error) => {
-            return arguments.format.fail("find", &format!("find: {error}"), Outcome::BusFailed);
+            return arguments
+                .format
+                .fail("find", &format!("find: {error}"), Outcome::BusFailed);
         }
     };
-    let outcome = if findings.devices.is_empty() { Outcome::BusFailed } else { Outcome::Done };
+    let outcome = if findings.devices.is_empty() {
+        Outcome::BusFailed
+    } else {
+        Outcome::Done
+    };
     let printed = if arguments.format.is_json() {
         print_document("find", document(&findings))
     } else {
         print("find", &report(&findings, arguments.cfg))
     };
-    if printed == Outcome::Done { outcome } else { printed }
+    if printed == Outcome::Done {
+        outcome
+    } else {
+        printed
+    }
 }
 
 fn facts(device: &Device) -> String {
-    let facts = device.found.facts.iter().map(|(name, text)| format!("{name} {text}"));
+    let facts = device
+        .found
+        .facts
+        .iter()
+        .map(|(name, text)| format!("{name} {text}"));
     facts.collect::<Vec<_>>().join(", ")
 }
 
@@ -129,7 +150,11 @@ fn report(findings: &Findings, with_tables: bool) -> String {
     if with_tables {
         for device in &findings.devices {
             // Writing to a string cannot fail.
-            let _ = writeln!(out, "# {} {}\n{}", device.address, device.found.identity, device.found.stanza);
+            let _ = writeln!(
+                out,
+                "# {} {}\n{}",
+                device.address, device.found.identity, device.found.stanza
+            );
         }
     }
     let swept = findings.swept;

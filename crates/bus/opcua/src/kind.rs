@@ -5,17 +5,20 @@ use std::path::Path;
 
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Collector, Key, Table, shown};
+use tickbus_fieldbus::examine::{Complaint, Examination, Search};
 use tickbus_fieldbus::faults::AnswerCodes;
 use tickbus_fieldbus::tcp::Writers;
 use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, NamedFile, OpenError, Role};
 use tickbus_image::signal::{Signal, SignalTable};
 
 use super::codes::CODES;
+use super::hello;
 use super::{ClientOptions, ServerOptions, keys, options, security};
 
 impl BusKind for ClientOptions {
     const NAME: &'static str = "opcua-client";
     const CAN_OBSERVE: bool = true;
+    const SEARCH: Option<Search> = Some(hello::SEARCH);
     const KEYS: &'static [&'static [Key]] = &[keys::CLIENT, security::KEYS];
 
     fn read(_role: Role, moved: bool, table: &mut Table<'_>) -> Option<Self> {
@@ -61,6 +64,21 @@ impl BusOptions for ClientOptions {
 
     fn place(&self, signal: &Signal, table: &SignalTable) -> String {
         self.place(signal, &table.stations[signal.station])
+    }
+
+    #[cfg(feature = "opcua")]
+    fn examine(&self, examination: &mut Examination<'_>) {
+        super::client::examine(self, examination);
+    }
+
+    #[cfg(not(feature = "opcua"))]
+    fn examine(&self, examination: &mut Examination<'_>) {
+        let Some((_, mut wire)) = examination.reach(&self.url.address) else {
+            return;
+        };
+        if hello::says_hello(examination, &mut wire, &self.url) {
+            examination.unexamined("OPC UA, which is not in this build,");
+        }
     }
 }
 
@@ -134,6 +152,29 @@ impl BusOptions for ServerOptions {
         node.map_or_else(String::new, |node| {
             shown(&format!("{}{}", node.name, node.member))
         })
+    }
+
+    fn examine(&self, examination: &mut Examination<'_>) {
+        if examination.can_listen(&self.address) {
+            examination.sizes("the PLC subscribes to what it needs");
+        }
+    }
+
+    fn complaints(&self) -> &'static [Complaint] {
+        &[
+            Complaint {
+                counter: "opcua.rejected_certificates",
+                cause: "certificate-unknown",
+                what: "the PLC shows a certificate that is not trusted here",
+                next: "move it from the folder \"rejected\" below pki to \"trusted\"",
+            },
+            Complaint {
+                counter: "opcua.refused_applications",
+                cause: "application-refused",
+                what: "the PLC's certificate belongs to another application",
+                next: "let the PLC make a certificate with its own ApplicationUri",
+            },
+        ]
     }
 }
 

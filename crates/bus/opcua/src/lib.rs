@@ -5,6 +5,7 @@
 
 mod at;
 mod codes;
+mod hello;
 mod identity;
 mod keys;
 mod kind;

@@ -44,7 +44,11 @@ impl Unreachable {
 /// # Errors
 ///
 /// The name is unknown, or cannot be looked up.
-pub fn look_up(address: &Address, clock: &dyn Clock, stop: &Stop) -> Result<Vec<SocketAddr>, Error> {
+pub fn look_up(
+    address: &Address,
+    clock: &dyn Clock,
+    stop: &Stop,
+) -> Result<Vec<SocketAddr>, Error> {
     resolve(address, clock, stop).map(Option::unwrap_or_default)
 }
 
@@ -71,7 +75,10 @@ pub fn route(address: SocketAddr) -> Result<IpAddr, Unreachable> {
 /// # Errors
 ///
 /// Why there is no connection.
-pub fn try_connect(address: SocketAddr, patience: Nanos) -> Result<std::net::TcpStream, Unreachable> {
+pub fn try_connect(
+    address: SocketAddr,
+    patience: Nanos,
+) -> Result<std::net::TcpStream, Unreachable> {
     let stream = std::net::TcpStream::connect_timeout(&address, patience.to_duration());
     let stream = stream.and_then(|stream| {
         not_itself(stream.local_addr()?, stream.peer_addr()?)?;
@@ -173,7 +180,8 @@ pub fn sweep(
             set.remove(key, &stream);
             let error = stream.take_error()?;
             let checked = error.map_or(Ok(()), Err);
-            let checked = checked.and_then(|()| not_itself(stream.local_addr()?, stream.peer_addr()?));
+            let checked =
+                checked.and_then(|()| not_itself(stream.local_addr()?, stream.peer_addr()?));
             match checked.and_then(|()| stream.into_os()) {
                 Ok(stream) => found(address, stream),
                 Err(error) => swept.judge(&error),

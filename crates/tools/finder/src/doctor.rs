@@ -22,7 +22,9 @@ pub struct Terms {
 /// Goes along the line of a driver.cfg. Texts of the peer are without control characters. A server that is to wait for its
 /// PLC answers it, with the fail-safe values; a client writes nothing.
 pub fn examine(config: &Config, terms: Terms, clock: &Arc<dyn Clock>, stop: &Stop) -> Vec<Step> {
-    let watches = config.life_signs.watches(&config.table, config.role, config.timing.max_age);
+    let watches = config
+        .life_signs
+        .watches(&config.table, config.role, config.timing.max_age);
     let watched = watches.iter().filter_map(|watch| {
         let signal = config.table.position(&watch.name)?;
         Some((signal, watch.within))
@@ -40,7 +42,10 @@ pub fn examine(config: &Config, terms: Terms, clock: &Arc<dyn Clock>, stop: &Sto
         hosted: None,
     };
     let mut examination = Examination::new(setup, watched.collect(), terms.watch, stop);
-    examination.ok("file", format!("{} is right: {}", config.path.display(), config.bus.kind()));
+    examination.ok(
+        "file",
+        format!("{} is right: {}", config.path.display(), config.bus.kind()),
+    );
     config.bus.examine(&mut examination);
     let listens = !config.bus.complaints().is_empty() && !examination.has_failed();
     if listens && terms.wait > Nanos::ZERO {

@@ -71,15 +71,24 @@ pub fn find(plan: &Plan, clock: &Arc<dyn Clock>, stop: &Stop) -> io::Result<Find
     let receiver = Mutex::new(receiver);
     let work = || {
         loop {
-            let next = receiver.lock().unwrap_or_else(PoisonError::into_inner).recv();
+            let next = receiver
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .recv();
             let Ok((address, stream)) = next else {
                 return;
             };
             let found = ask(plan, address, stream, clock);
             if found.is_empty() {
-                unknown.lock().unwrap_or_else(PoisonError::into_inner).push(address);
+                unknown
+                    .lock()
+                    .unwrap_or_else(PoisonError::into_inner)
+                    .push(address);
             } else {
-                devices.lock().unwrap_or_else(PoisonError::into_inner).extend(found);
+                devices
+                    .lock()
+                    .unwrap_or_else(PoisonError::into_inner)
+                    .extend(found);
             }
         }
     };
@@ -93,13 +102,21 @@ pub fn find(plan: &Plan, clock: &Arc<dyn Clock>, stop: &Stop) -> io::Result<Find
             }
         }
         let sender = sender;
-        sweep(plan.addresses.iter().copied(), limits, &**clock, stop, |address, stream| {
-            // The receivers live as long as this scope.
-            let _ = sender.send((address, stream));
-        })
+        sweep(
+            plan.addresses.iter().copied(),
+            limits,
+            &**clock,
+            stop,
+            |address, stream| {
+                // The receivers live as long as this scope.
+                let _ = sender.send((address, stream));
+            },
+        )
     })?;
     let mut devices = devices.into_inner().unwrap_or_else(PoisonError::into_inner);
-    devices.sort_by(|a: &Device, b| (a.address, a.bus, &a.found.facts).cmp(&(b.address, b.bus, &b.found.facts)));
+    devices.sort_by(|a: &Device, b| {
+        (a.address, a.bus, &a.found.facts).cmp(&(b.address, b.bus, &b.found.facts))
+    });
     let mut unknown = unknown.into_inner().unwrap_or_else(PoisonError::into_inner);
     unknown.sort_unstable();
     Ok(Findings {
@@ -118,7 +135,10 @@ fn ask(
 ) -> Vec<Device> {
     let peer = Peer::new(address, CONNECT, ANSWER, clock);
     let mut first = Some(stream);
-    let at_port = plan.searches.iter().filter(|(_, port)| *port == address.port());
+    let at_port = plan
+        .searches
+        .iter()
+        .filter(|(_, port)| *port == address.port());
     let mut searches: Vec<&Search> = at_port.map(|(search, _)| search).collect();
     if searches.is_empty() {
         // A target with a port of its own: whatever speaks there.
@@ -157,7 +177,9 @@ fn legible(found: Found) -> Found {
         facts,
         stanza,
     } = found;
-    let facts = facts.into_iter().map(|(name, text)| (name, printable(&text)));
+    let facts = facts
+        .into_iter()
+        .map(|(name, text)| (name, printable(&text)));
     Found {
         identity: printable(&identity),
         facts: facts.collect(),

@@ -25,11 +25,15 @@ impl FromStr for Target {
 
     fn from_str(text: &str) -> Result<Self, Mistake> {
         if let Some((network, bits)) = text.split_once('/') {
-            return network_of(network, bits).ok_or_else(|| wrong(text)).and_then(|range| range.check(text));
+            return network_of(network, bits)
+                .ok_or_else(|| wrong(text))
+                .and_then(|range| range.check(text));
         }
         let (bare, port) = match text.rsplit_once(':') {
             // The brackets of an IPv6 address end before its port.
-            Some((host, digits)) if !digits.contains(']') && (!host.contains(':') || host.ends_with(']')) => {
+            Some((host, digits))
+                if !digits.contains(']') && (!host.contains(':') || host.ends_with(']')) =>
+            {
                 let address: Address = text.parse()?;
                 address.check_dialled()?;
                 (host, Some(digits.parse().map_err(|_| wrong(text))?))
@@ -59,7 +63,11 @@ fn network_of(network: &str, bits: &str) -> Option<Target> {
     let bits: u32 = bits.parse().ok().filter(|bits| *bits <= 32 && *bits > 0)?;
     let mask = u32::MAX << (32 - bits);
     let (first, last) = (network.to_bits() & mask, network.to_bits() | !mask);
-    let ends = if bits < 31 { (first + 1, last - 1) } else { (first, last) };
+    let ends = if bits < 31 {
+        (first + 1, last - 1)
+    } else {
+        (first, last)
+    };
     Some(Target::Range(ends.0.into(), ends.1.into(), None))
 }
 
@@ -123,7 +131,11 @@ pub fn addresses(
     // One port of all addresses after another: an address gets its packets apart.
     let mut all: Vec<SocketAddr> = Vec::new();
     for port in ports {
-        all.extend(hosts.iter().map(|(ip, own)| SocketAddr::new(*ip, own.unwrap_or(*port))));
+        all.extend(
+            hosts
+                .iter()
+                .map(|(ip, own)| SocketAddr::new(*ip, own.unwrap_or(*port))),
+        );
     }
     let mut seen = std::collections::HashSet::new();
     all.retain(|address| seen.insert(*address));
@@ -151,7 +163,10 @@ mod tests {
         assert_eq!(all("10.0.0.5-6:7"), ["10.0.0.5:7", "10.0.0.6:7"]);
         assert_eq!(all("10.0.0.255-10.0.1.0:7").len(), 2);
         assert_eq!(all("192.168.0.0/24").len(), 2 * 254);
-        assert_eq!(all("192.168.0.77/30")[..2], ["192.168.0.77:502", "192.168.0.78:502"]);
+        assert_eq!(
+            all("192.168.0.77/30")[..2],
+            ["192.168.0.77:502", "192.168.0.78:502"]
+        );
         assert_eq!(all("10.0.0.1/32").len(), 2);
         assert_eq!(all("10.0.0.0/31").len(), 4);
     }

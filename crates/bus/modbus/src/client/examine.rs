@@ -94,7 +94,12 @@ impl ClientOptions {
                     tickbus_fieldbus::OpenError::Config(mistake) => mistake.to_string(),
                     tickbus_fieldbus::OpenError::Unsupported(why) => why,
                 };
-                examination.fail("tls", "tls-files", why, "correct the keys of [fieldbus.tls]");
+                examination.fail(
+                    "tls",
+                    "tls-files",
+                    why,
+                    "correct the keys of [fieldbus.tls]",
+                );
                 return None;
             }
         };
@@ -105,7 +110,9 @@ impl ClientOptions {
             }
             Err((cause, why)) => {
                 let next = match cause {
-                    "tls-missing" => "remove \"tls\", or switch on Modbus/TCP Security in the device (port 802)",
+                    "tls-missing" => {
+                        "remove \"tls\", or switch on Modbus/TCP Security in the device (port 802)"
+                    }
                     _ => "exchange the certificates: each end needs the authority of the other one",
                 };
                 examination.fail("tls", cause, why, next);
@@ -161,14 +168,17 @@ impl ClientOptions {
                 return false;
             }
             Miss::End(WireEnd::Closed | WireEnd::Broken(_)) if reached.tls.is_some() => {
-                let next = "let the device trust the authority of certificate_file, and see its log";
+                let next =
+                    "let the device trust the authority of certificate_file, and see its log";
                 examination.fail("tls", "certificate-refused", told, next);
                 return false;
             }
             _ => {}
         }
         let others = USUAL_UNITS.into_iter().filter(|other| *other != unit);
-        let other = others.into_iter().find(|other| answers_as_unit(reached, *other, &probe));
+        let other = others
+            .into_iter()
+            .find(|other| answers_as_unit(reached, *other, &probe));
         if let Some(other) = other {
             examination.fail(
                 "protocol",
@@ -232,7 +242,12 @@ impl ClientOptions {
 
     fn pieces_of_signals(&self, examination: &Examination<'_>) -> Vec<(u8, Vec<Piece>)> {
         let signals = examination.setup.table.signals.iter();
-        let of = |signal: &Signal| (self.unit(signal.station), self.pieces_of(examination, signal));
+        let of = |signal: &Signal| {
+            (
+                self.unit(signal.station),
+                self.pieces_of(examination, signal),
+            )
+        };
         signals.map(of).collect()
     }
 
@@ -247,7 +262,11 @@ impl ClientOptions {
                 pieces.extend(self.pieces(table, station, written));
             }
             let requests = super::queries(&pieces, &[], &self.capabilities());
-            all.extend(requests.into_iter().map(|request| (self.unit(station), request)));
+            all.extend(
+                requests
+                    .into_iter()
+                    .map(|request| (self.unit(station), request)),
+            );
         }
         all
     }
@@ -270,7 +289,10 @@ impl ClientOptions {
             *talk = again;
         }
         // The polling client knows devices by function 43 alone.
-        let line = identity.as_ref().map(crate::Identification::line).unwrap_or_default();
+        let line = identity
+            .as_ref()
+            .map(crate::Identification::line)
+            .unwrap_or_default();
         if line.is_empty() {
             let usual = format!("modbus device at {}, unit {unit}", reached.peer.address);
             examination.compare_identity(&usual, write_to);
@@ -306,7 +328,10 @@ impl ClientOptions {
                     let name = &signal.name;
                     let next = "see whether the device closes connections at this request: read less, or from \
                                 another table";
-                    let why = format!("the device {miss} when \"{name}\" at {} is read", place(&pieces, 0));
+                    let why = format!(
+                        "the device {miss} when \"{name}\" at {} is read",
+                        place(&pieces, 0)
+                    );
                     examination.fail("addresses", "connection-lost", why, next);
                     return false;
                 }
@@ -317,7 +342,11 @@ impl ClientOptions {
             }
         }
         if refused.is_empty() {
-            let rest = if count > SINGLES { format!("; the first {SINGLES} were read one by one") } else { String::new() };
+            let rest = if count > SINGLES {
+                format!("; the first {SINGLES} were read one by one")
+            } else {
+                String::new()
+            };
             examination.ok("addresses", format!("all signals can be read{rest}"));
         } else {
             self.tell_refused(examination, &refused);
@@ -326,17 +355,29 @@ impl ClientOptions {
         !refused.len().eq(&count.min(SINGLES)) || count == 0
     }
 
-    fn tell_refused(&self, examination: &mut Examination<'_>, refused: &[(usize, Miss, [bool; 2])]) {
+    fn tell_refused(
+        &self,
+        examination: &mut Examination<'_>,
+        refused: &[(usize, Miss, [bool; 2])],
+    ) {
         let signals = &examination.setup.table.signals;
         let details: Vec<String> = refused
             .iter()
             .take(10)
             .map(|(index, miss, _)| {
                 let pieces = self.pieces_of(examination, &signals[*index]);
-                format!("\"{}\" at {}: the device {miss}", signals[*index].name, place(&pieces, 0))
+                format!(
+                    "\"{}\" at {}: the device {miss}",
+                    signals[*index].name,
+                    place(&pieces, 0)
+                )
             })
             .collect();
-        let is = |exception| refused.iter().all(|(_, miss, _)| *miss == Miss::Refused(exception));
+        let is = |exception| {
+            refused
+                .iter()
+                .all(|(_, miss, _)| *miss == Miss::Refused(exception))
+        };
         let all = |side: usize| refused.iter().all(|(_, _, can)| can[side]);
         let (cause, next) = if is(Exception::ILLEGAL_FUNCTION) {
             (
@@ -359,7 +400,11 @@ impl ClientOptions {
                 "the device has no such elements: correct the addresses, or enlarge the area in the PLC",
             )
         };
-        let evidence = format!("{} of {} signals cannot be read", refused.len(), signals.len());
+        let evidence = format!(
+            "{} of {} signals cannot be read",
+            refused.len(),
+            signals.len()
+        );
         examination.fail("addresses", cause, evidence, next).details = details;
     }
 }
@@ -384,9 +429,9 @@ const fn other_frame(frame: Frame) -> Frame {
 fn answers(talk: &mut Talk, unit: u8, probe: &Request) -> Result<(), Miss> {
     let mut receives = [0; 2];
     match talk.read(unit, probe, &mut receives) {
-        Err(Miss::Refused(Exception::GATEWAY_PATH_UNAVAILABLE | Exception::GATEWAY_TARGET_FAILED)) => {
-            talk.read(unit, probe, &mut receives)
-        }
+        Err(Miss::Refused(
+            Exception::GATEWAY_PATH_UNAVAILABLE | Exception::GATEWAY_TARGET_FAILED,
+        )) => talk.read(unit, probe, &mut receives),
         Err(Miss::Refused(_)) => Ok(()),
         answered => answered,
     }
@@ -440,7 +485,9 @@ fn place(pieces: &[Piece], shift: isize) -> String {
 /// The step `clients`: whether the device serves a second client beside this one.
 fn second_client(examination: &mut Examination<'_>, reached: &Reached<'_>, unit: u8) {
     let first = Region::new(Table::HoldingRegisters, Span { first: 0, count: 1 });
-    let served = reached.again().is_some_and(|mut talk| answers(&mut talk, unit, &Request::Read(first)).is_ok());
+    let served = reached
+        .again()
+        .is_some_and(|mut talk| answers(&mut talk, unit, &Request::Read(first)).is_ok());
     if served {
         examination.ok("clients", "a second connection is served as well");
     } else {
@@ -486,7 +533,9 @@ fn round(
         for piece in pieces {
             let span = piece.span();
             let found = regions.iter().find(|(of, table, region, _)| {
-                (of, *table) == (unit, piece.table) && region.first <= span.first && span.end() <= region.end()
+                (of, *table) == (unit, piece.table)
+                    && region.first <= span.first
+                    && span.end() <= region.end()
             });
             let Some((_, table, region, bytes)) = found else {
                 return Vec::new();

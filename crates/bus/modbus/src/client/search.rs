@@ -21,7 +21,11 @@ fn ask(searching: Searching<'_>) -> Vec<Found> {
     let Searching { peer, wire, units } = searching;
     let mut found = Vec::new();
     let is_listed = !units.is_empty();
-    let units = if is_listed { units } else { &USUAL_UNITS[..UNITS] };
+    let units = if is_listed {
+        units
+    } else {
+        &USUAL_UNITS[..UNITS]
+    };
     let mut talk = Some(Talk::new(wire, Frame::Tcp));
     for unit in units {
         let open = talk.take();
@@ -51,7 +55,9 @@ fn identify(talk: &mut Talk, unit: u8) -> Result<Identification, Miss> {
         Err(Miss::Refused(exception)) if !exception.passes() => {
             let first = Region::new(Table::HoldingRegisters, Span { first: 0, count: 1 });
             match talk.read(unit, &Request::Read(first), &mut [0; 2]) {
-                Err(Miss::Refused(exception)) if exception.passes() => Err(Miss::Refused(exception)),
+                Err(Miss::Refused(exception)) if exception.passes() => {
+                    Err(Miss::Refused(exception))
+                }
                 Ok(()) | Err(Miss::Refused(_)) => Ok(Identification::default()),
                 Err(miss) => Err(miss),
             }
@@ -63,7 +69,12 @@ fn identify(talk: &mut Talk, unit: u8) -> Result<Identification, Miss> {
 fn describe(address: &str, unit: u8, identification: &Identification) -> Found {
     let mut identity = identification.line();
     if identity.is_empty() {
-        identity.clone_from(identification.server_id.as_ref().unwrap_or(&identity.clone()));
+        identity.clone_from(
+            identification
+                .server_id
+                .as_ref()
+                .unwrap_or(&identity.clone()),
+        );
     }
     Found {
         identity,

@@ -19,10 +19,15 @@ pub(crate) fn open(side: &ClientSide, wire: Wire) -> Result<Wire, (&'static str,
     let ClientSide(config, name) = side;
     let connection = ClientConnection::new(Arc::clone(config), name.clone());
     let connection = connection.map_err(|error| ("tls-files", error.to_string()))?;
-    let socket = wire.socket().map_err(|error| ("connect-failed", error.to_string()))?;
+    let socket = wire
+        .socket()
+        .map_err(|error| ("connect-failed", error.to_string()))?;
     let mut stream = StreamOwned::new(connection, socket);
     while stream.conn.is_handshaking() {
-        stream.conn.complete_io(&mut stream.sock).map_err(|error| judge(&error))?;
+        stream
+            .conn
+            .complete_io(&mut stream.sock)
+            .map_err(|error| judge(&error))?;
     }
     Ok(wire.within(Box::new(Legible(stream))))
 }

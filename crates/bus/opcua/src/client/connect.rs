@@ -71,6 +71,24 @@ pub(super) async fn endpoint(
             "{url} does not answer as an OPC UA server ({error}); check that this is its port"
         ))
     })?;
+    choose(&endpoints, options, login).map_err(|refusal| BusError::Refused(refusal.text))
+}
+
+/// Why no endpoint of a server can be used.
+pub(super) struct NoEndpoint {
+    /// The cause as a fixed word.
+    pub(super) cause: &'static str,
+    /// The reason, and the remedy.
+    pub(super) text: String,
+}
+
+/// Chooses the endpoint that matches `options`.
+pub(super) fn choose(
+    endpoints: &[EndpointDescription],
+    options: &ClientOptions,
+    login: &Login,
+) -> Result<EndpointDescription, NoEndpoint> {
+    let url = &options.url;
     let mode = match (options.security, options.credentials.mode) {
         (Policy::None, _) => MessageSecurityMode::None,
         (_, Mode::Sign) => MessageSecurityMode::Sign,
@@ -84,14 +102,24 @@ pub(super) async fn endpoint(
     let Some(endpoint) = endpoints.iter().find(fits) else {
         let mut offered: Vec<String> = endpoints.iter().map(shown).collect();
         offered.dedup();
-        return Err(BusError::Refused(format!(
-            "the server has no endpoint with {}; it has {}; write one of them as security and mode",
-            asked(options),
-            offered.join(" and ")
-        )));
+        return Err(NoEndpoint {
+            cause: "no-endpoint",
+            text: format!(
+                "the server has no endpoint with {}; it has {}; write one of them as security and mode",
+                asked(options),
+                offered.join(" and ")
+            ),
+        });
     };
     let mut endpoint = endpoint.clone();
-    check_user(&endpoint, login)?;
+    check_user(&endpoint, login).map_err(|text| NoEndpoint {
+        cause: if login.is_none() {
+            "user-required"
+        } else {
+            "user-refused"
+        },
+        text,
+    })?;
     // The server's own host name may be unknown here.
     let own = url_with_replaced_hostname(
         endpoint.endpoint_url.as_ref(),
@@ -114,7 +142,7 @@ fn asked(options: &ClientOptions) -> String {
 }
 
 /// An endpoint in the terms of a driver.cfg.
-fn shown(endpoint: &EndpointDescription) -> String {
+pub(super) fn shown(endpoint: &EndpointDescription) -> String {
     let uri = endpoint.security_policy_uri.as_ref();
     let name = uri.rsplit_once('#').map_or(uri, |(_, name)| name);
     match endpoint.security_mode {
@@ -124,20 +152,34 @@ fn shown(endpoint: &EndpointDescription) -> String {
 }
 
 /// Checks that the endpoint accepts this kind of user.
-fn check_user(endpoint: &EndpointDescription, login: &Login) -> Result<(), BusError> {
+fn check_user(endpoint: &EndpointDescription, login: &Login) -> Result<(), String> {
     let Some(policies) = &endpoint.user_identity_tokens else {
         return Ok(());
     };
     let takes = |kind| policies.iter().any(|policy| policy.token_type == kind);
     match login {
-        None if !takes(UserTokenType::Anonymous) => Err(BusError::Refused(
-            "the server lets nobody in without a user; add user and password_file".to_owned(),
-        )),
-        Some((user, _)) if !takes(UserTokenType::UserName) => Err(BusError::Refused(format!(
+        None if !takes(UserTokenType::Anonymous) => {
+            Err("the server lets nobody in without a user; add user and password_file".to_owned())
+        }
+        Some((user, _)) if !takes(UserTokenType::UserName) => Err(format!(
             "the server takes no user with a password at this endpoint; remove user = \"{user}\", or let \
              the server take it"
-        ))),
+        )),
         _ => Ok(()),
+    }
+}
+
+/// Why there is no session.
+pub(super) struct Unopened {
+    /// The status that the server gave.
+    pub(super) status: StatusCode,
+    /// The reason, and the remedy.
+    pub(super) error: BusError,
+}
+
+impl From<Unopened> for BusError {
+    fn from(unopened: Unopened) -> Self {
+        unopened.error
     }
 }
 
@@ -149,7 +191,7 @@ pub(super) async fn open(
     login: Login,
     pki: &Pki,
     inbox: Inbox<Notification>,
-) -> Result<Arc<Session>, BusError> {
+) -> Result<Arc<Session>, Unopened> {
     let secure = endpoint.security_mode != MessageSecurityMode::None;
     let user = login.as_ref().map(|(user, _)| user.clone());
     let token = match login {
@@ -164,8 +206,10 @@ pub(super) async fn open(
             let builder = builder.with_connector(dial).user_identity_token(token);
             builder.build(store)
         });
-    let (session, events) =
-        built.map_err(|error| BusError::Refused(format!("there can be no session ({error})")))?;
+    let (session, events) = built.map_err(|error| Unopened {
+        status: StatusCode::BadUnexpectedError,
+        error: BusError::Refused(format!("there can be no session ({error})")),
+    })?;
     session.disable_reconnects();
     let mut events = Box::pin(events.enter());
     loop {
@@ -181,7 +225,8 @@ pub(super) async fn open(
             Some(Ok(_)) => continue,
             None => StatusCode::BadConnectionClosed,
         };
-        return Err(refusal(status, secure, user.as_deref(), pki));
+        let error = refusal(status, secure, user.as_deref(), pki);
+        return Err(Unopened { status, error });
     }
     tokio::spawn(async move {
         let end = loop {

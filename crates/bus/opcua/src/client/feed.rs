@@ -89,7 +89,7 @@ const STATE: u32 = u32::MAX;
 /// does not report its state, or does not know it, is assumed to run, even if an earlier server at this address
 /// reported a stop. The outputs of a server in test mode have no effect, like those of a suspended one (OPC 10000-5,
 /// 12.6).
-fn state(value: &DataValue) -> Option<PlcState> {
+pub(super) fn state(value: &DataValue) -> Option<PlcState> {
     const RUNNING: i32 = ServerState::Running as i32;
     const UNKNOWN: i32 = ServerState::Unknown as i32;
     match value.value {

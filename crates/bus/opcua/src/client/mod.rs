@@ -2,9 +2,11 @@
 
 mod connect;
 mod dial;
+mod examine;
 mod feed;
 mod nodes;
 mod readings;
+mod search;
 mod session;
 mod writings;
 
@@ -24,8 +26,10 @@ use super::reactor::{Driven, Reactor};
 use super::{ClientOptions, NodeName, Policy};
 use connect::Login;
 use dial::Dial;
+pub(crate) use examine::examine;
 use feed::Rhythm;
 use readings::Readings;
+pub(crate) use search::identity as found;
 use session::ClientSession;
 use writings::Writings;
 

@@ -23,14 +23,14 @@ const CHUNK: usize = 50;
 const TOLD: usize = 5;
 
 /// The attributes read from each node.
-const ATTRIBUTES: [AttributeId; 3] = [
+pub(super) const ATTRIBUTES: [AttributeId; 3] = [
     AttributeId::Value,
     AttributeId::DataType,
     AttributeId::UserAccessLevel,
 ];
 
 /// The bits of an access level.
-const READS: u8 = 1;
+pub(super) const READS: u8 = 1;
 const WRITES: u8 = 2;
 
 /// The server's information about itself.
@@ -39,7 +39,8 @@ pub(super) struct Server {
     pub(super) product: String,
     /// The most values in one Write; 0 for no limit.
     pub(super) most_writes: usize,
-    namespaces: Vec<String>,
+    /// The URIs of the namespaces, by their numbers.
+    pub(super) namespaces: Vec<String>,
 }
 
 /// Asks the server for its product, its limits and its namespaces.
@@ -71,7 +72,11 @@ pub(super) async fn ask(session: &Session) -> Result<Server, BusError> {
     })
 }
 
-async fn read(session: &Session, wanted: &[ReadValueId]) -> Result<Vec<DataValue>, BusError> {
+/// Reads values or other attributes.
+pub(super) async fn read(
+    session: &Session,
+    wanted: &[ReadValueId],
+) -> Result<Vec<DataValue>, BusError> {
     let values = session.read(wanted, TimestampsToReturn::Neither, 0.0).await;
     let values = values.map_err(|error| {
         BusError::Link(format!(
@@ -92,7 +97,7 @@ async fn read(session: &Session, wanted: &[ReadValueId]) -> Result<Vec<DataValue
 
 impl Server {
     /// The node that a driver.cfg names.
-    fn node(&self, name: &NodeName) -> Result<NodeId, String> {
+    pub(super) fn node(&self, name: &NodeName) -> Result<NodeId, String> {
         let namespace = match &name.namespace {
             Namespace::Index(index) => *index,
             Namespace::Uri(uri) => {
@@ -158,7 +163,8 @@ pub(super) async fn check(
     )))
 }
 
-fn judge(field: &Field, values: &[DataValue], writes: bool) -> Result<(), String> {
+/// Whether a node with these attributes fits the signal.
+pub(super) fn judge(field: &Field, values: &[DataValue], writes: bool) -> Result<(), String> {
     let Field {
         name,
         node,

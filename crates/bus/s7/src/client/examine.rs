@@ -2,7 +2,9 @@
 //! state; and the search for CPUs.
 
 use super::plan::Field;
-use super::{ClientOptions, ClientSession, ConnectionParameters, End, FrameFields, Refusal, SessionEvent};
+use super::{
+    ClientOptions, ClientSession, ConnectionParameters, End, FrameFields, Refusal, SessionEvent,
+};
 use crate::item::{Object, ReturnCode};
 use crate::length::LONGEST;
 use crate::pdu::error;
@@ -44,7 +46,14 @@ struct Talk {
 }
 
 impl Talk {
-    fn new(wire: Wire, peer: &Peer, fields: &FrameFields, (calling, called): (Tsap, Tsap), pdu: u16, asks_who: bool) -> Self {
+    fn new(
+        wire: Wire,
+        peer: &Peer,
+        fields: &FrameFields,
+        (calling, called): (Tsap, Tsap),
+        pdu: u16,
+        asks_who: bool,
+    ) -> Self {
         let terms = ConnectionParameters {
             calling,
             called,
@@ -74,7 +83,9 @@ impl Talk {
                 self.session.wrote(out.len());
             }
             let deadline = self.wire.deadline();
-            self.wire.receive(&mut bytes, deadline).map_err(Miss::Wire)?;
+            self.wire
+                .receive(&mut bytes, deadline)
+                .map_err(Miss::Wire)?;
         }
     }
 
@@ -162,7 +173,10 @@ impl ClientOptions {
         };
         examination.ok(
             "protocol",
-            format!("a CPU answers at TSAP {}, with PDUs of {length} bytes", self.called),
+            format!(
+                "a CPU answers at TSAP {}, with PDUs of {length} bytes",
+                self.called
+            ),
         );
         let line = identity.map(|identity| identity.line()).unwrap_or_default();
         let line = if line.is_empty() {
@@ -219,7 +233,11 @@ impl ClientOptions {
         let table = examination.setup.table;
         let requests = self.shown_requests(table).join("; ");
         let asked = self.pdu;
-        let short = if length < asked { format!(" (asked for {asked})") } else { String::new() };
+        let short = if length < asked {
+            format!(" (asked for {asked})")
+        } else {
+            String::new()
+        };
         examination.sizes(&format!("PDUs of {length} bytes{short}; {requests}"));
     }
 
@@ -227,7 +245,10 @@ impl ClientOptions {
     fn strange(&self, examination: &mut Examination<'_>, peer: &Peer, miss: &Miss) {
         let address = peer.address;
         if let Miss::Session(End::Broken(why)) = miss
-            && !matches!(why, ProtocolError::Disconnected(_) | ProtocolError::Rejected(_))
+            && !matches!(
+                why,
+                ProtocolError::Disconnected(_) | ProtocolError::Rejected(_)
+            )
         {
             let (cause, next) = match why {
                 ProtocolError::S7CommPlus => (
@@ -235,7 +256,10 @@ impl ClientOptions {
                     "the CPU speaks S7CommPlus only: permit PUT/GET communication in its properties, under Protection & \
                      Security",
                 ),
-                _ => ("not-s7", "correct the port (S7 has 102), or the kind of bus"),
+                _ => (
+                    "not-s7",
+                    "correct the port (S7 has 102), or the kind of bus",
+                ),
             };
             examination.fail("protocol", cause, format!("{address}: {why}"), next);
             return;
@@ -244,7 +268,9 @@ impl ClientOptions {
             Miss::Wire(end) => format!("{address}, TSAP {}, {end}", self.called),
             Miss::Session(end) => end.clone().into_error(address).to_string(),
         };
-        let slots = SLOTS.into_iter().filter(|(rack, slot)| Tsap::of_slot(*rack, *slot) != self.called);
+        let slots = SLOTS
+            .into_iter()
+            .filter(|(rack, slot)| Tsap::of_slot(*rack, *slot) != self.called);
         let other = slots.into_iter().find(|(rack, slot)| {
             let called = Tsap::of_slot(*rack, *slot);
             meets(peer, (self.calling, called)).is_some()
@@ -373,7 +399,9 @@ fn whole_refusal(miss: &Miss) -> (&'static str, String, String) {
                 _ => "job-refused",
             };
             let text = refusal.to_string();
-            let (told, next) = text.split_once("; ").unwrap_or((&text, "see its diagnostic buffer"));
+            let (told, next) = text
+                .split_once("; ")
+                .unwrap_or((&text, "see its diagnostic buffer"));
             (cause, format!("the CPU {told}"), next.to_owned())
         }
         Miss::Session(end) => {
@@ -418,7 +446,9 @@ fn item_refusal(refused: &[(&Signal, Refusal)]) -> (&'static str, &'static str) 
 
 fn places(variable: Option<Variable>) -> [String; 3] {
     let at = |shifted: Option<usize>| {
-        let moved = variable.zip(shifted).map(|(variable, byte)| Variable { byte, ..variable });
+        let moved = variable
+            .zip(shifted)
+            .map(|(variable, byte)| Variable { byte, ..variable });
         moved.map(|moved| moved.to_string()).unwrap_or_default()
     };
     let byte = variable.map(|variable| variable.byte);
@@ -440,7 +470,11 @@ fn round(talk: &mut Talk, table: &SignalTable) -> Option<Round> {
         values.push(own.to_vec());
         frame = rest;
     }
-    Some(Round { begin, took, values })
+    Some(Round {
+        begin,
+        took,
+        values,
+    })
 }
 
 /// Asks for the identity, at each of the usual racks and slots until one answers.
@@ -463,7 +497,9 @@ fn ask(searching: Searching<'_>) -> Vec<Found> {
             Err(Miss::Session(End::Broken(
                 ProtocolError::NoIsoOnTcp(_) | ProtocolError::PacketLength(_),
             ))) => return Vec::new(),
-            Err(_) if talk.session.asks_who() => meets(&peer, ends).and_then(|(_, identity)| identity),
+            Err(_) if talk.session.asks_who() => {
+                meets(&peer, ends).and_then(|(_, identity)| identity)
+            }
             // What falls silent at the first slot is no CPU; a CPU refuses, or closes the connection.
             Err(Miss::Wire(WireEnd::Silent)) => return Vec::new(),
             Err(_) => continue,

@@ -122,13 +122,20 @@ fn is_judged(signal: &Signal) -> bool {
     signal.data_type != DataType::Bool
         && signal.data_type.size_bytes() > 1
         && (signal.range.is_some()
-            || !matches!(signal.data_type, DataType::Word | DataType::Dword | DataType::Lword))
+            || !matches!(
+                signal.data_type,
+                DataType::Word | DataType::Dword | DataType::Lword
+            ))
 }
 
 fn text(bytes: &[u8], order: ByteOrder, signal: &Signal) -> String {
     let value = number(raw(bytes, order), signal.data_type);
     let value = signal.scale.map_or(value, |scale| scale.value(value));
-    let unit = signal.unit.as_ref().map(|unit| format!(" {unit}")).unwrap_or_default();
+    let unit = signal
+        .unit
+        .as_ref()
+        .map(|unit| format!(" {unit}"))
+        .unwrap_or_default();
     format!("{}{unit}", short_number(value))
 }
 
@@ -158,7 +165,10 @@ impl Examination<'_> {
             .filter(|(_, signal)| is_judged(signal))
             .collect();
         if judged.is_empty() {
-            self.ok("values", "no numbers of more than one byte, so no order of bytes to judge");
+            self.ok(
+                "values",
+                "no numbers of more than one byte, so no order of bytes to judge",
+            );
             return;
         }
         let own = score(Hypothesis::AsConfigured, &judged).unwrap_or_default();
@@ -195,7 +205,9 @@ impl Examination<'_> {
         };
         let details: Vec<String> = judged
             .iter()
-            .filter(|(neighbours, signal)| penalty(raw(&neighbours.here, signal.order), signal) >= SUSPICIOUS)
+            .filter(|(neighbours, signal)| {
+                penalty(raw(&neighbours.here, signal.order), signal) >= SUSPICIOUS
+            })
             .map(|(neighbours, signal)| readings(neighbours, signal))
             .collect();
         let step = self.warn(
@@ -216,14 +228,20 @@ fn readings(neighbours: &Neighbours, signal: &Signal) -> String {
         orders = vec![ByteOrder::Abcd, ByteOrder::Dcba];
     }
     let orders = orders.iter().map(|order| {
-        let own = if *order == signal.order { " (configured)" } else { "" };
+        let own = if *order == signal.order {
+            " (configured)"
+        } else {
+            ""
+        };
         format!("{order} {}{own}", text(&neighbours.here, *order, signal))
     });
     let mut parts: Vec<String> = orders.collect();
     for (place, bytes) in [(below, &neighbours.below), (above, &neighbours.above)] {
-        parts.extend(bytes.as_ref().map(|bytes| {
-            format!("at {place} {}", text(bytes, signal.order, signal))
-        }));
+        parts.extend(
+            bytes
+                .as_ref()
+                .map(|bytes| format!("at {place} {}", text(bytes, signal.order, signal))),
+        );
     }
     format!("\"{}\" at {here}: {}", signal.name, parts.join(", "))
 }
@@ -239,9 +257,14 @@ mod tests {
 
     /// The verdict on a memory of registers, with a signal of this type at each of these registers.
     fn verdict(registers: &[u16], at: &[usize], data_type: DataType) -> Option<&'static str> {
-        let memory: Vec<u8> = registers.iter().flat_map(|word| word.to_be_bytes()).collect();
+        let memory: Vec<u8> = registers
+            .iter()
+            .flat_map(|word| word.to_be_bytes())
+            .collect();
         let size = data_type.size_bytes();
-        let signals = at.iter().map(|at| Signal::new(format!("s{at}"), Area::Output, at * 2, data_type));
+        let signals = at
+            .iter()
+            .map(|at| Signal::new(format!("s{at}"), Area::Output, at * 2, data_type));
         let table = SignalTable::of_one_station(0, memory.len() + 8, signals.collect());
         let clock: Arc<dyn Clock> = Manual::new();
         let stop = Stop::new();
@@ -278,7 +301,9 @@ mod tests {
     fn words(values: &[f32]) -> Vec<u16> {
         let halves = values.iter().map(|value| value.to_bits());
         #[expect(clippy::cast_possible_truncation, reason = "the halves of a word")]
-        halves.flat_map(|bits| [(bits >> 16) as u16, bits as u16]).collect()
+        halves
+            .flat_map(|bits| [(bits >> 16) as u16, bits as u16])
+            .collect()
     }
 
     #[test]
@@ -286,11 +311,17 @@ mod tests {
         let values = [21.37, 3.25, 0.8, 1500.0];
         let right = words(&values);
         assert_eq!(verdict(&right, &[0, 2, 4, 6], DataType::Real), None);
-        let swapped: Vec<u16> = right.chunks(2).flat_map(|pair| [pair[1], pair[0]]).collect();
+        let swapped: Vec<u16> = right
+            .chunks(2)
+            .flat_map(|pair| [pair[1], pair[0]])
+            .collect();
         let cause = verdict(&swapped, &[0, 2, 4, 6], DataType::Real);
         assert_eq!(cause, Some("word-order"));
         let bytes: Vec<u16> = right.iter().map(|word| word.swap_bytes()).collect();
-        assert_eq!(verdict(&bytes, &[0, 2, 4, 6], DataType::Real), Some("byte-order"));
+        assert_eq!(
+            verdict(&bytes, &[0, 2, 4, 6], DataType::Real),
+            Some("byte-order")
+        );
         let mut framed = vec![0];
         framed.extend(&right);
         framed.push(0);

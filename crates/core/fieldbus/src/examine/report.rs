@@ -4,7 +4,7 @@ use std::net::SocketAddr;
 
 use tickbus_base::time::{Nanos, Stop};
 use tickbus_image::signal::{Area, Signal};
-use tickbus_net::{Address, Unreachable, bind, look_up, route};
+use tickbus_net::{Address, Host, Unreachable, bind, look_up, route};
 
 use super::wire::{Peer, Wire};
 use crate::{BusSetup, Role};
@@ -70,7 +70,12 @@ impl<'a> Examination<'a> {
     const CONNECT: Nanos = Nanos::from_millis(2500);
 
     /// An examination without steps.
-    pub fn new(setup: BusSetup<'a>, watched: Vec<(usize, Nanos)>, watch: Nanos, stop: &'a Stop) -> Self {
+    pub fn new(
+        setup: BusSetup<'a>,
+        watched: Vec<(usize, Nanos)>,
+        watch: Nanos,
+        stop: &'a Stop,
+    ) -> Self {
         // An answer that takes longer makes all data stale anyway.
         let patience = (setup.max_age.times(4)).clamp(Nanos::from_millis(500), Nanos::from_secs(2));
         Self {
@@ -149,7 +154,9 @@ impl<'a> Examination<'a> {
     pub fn sizes(&mut self, further: &str) {
         let bytes = |area| {
             let stations = self.setup.table.stations.iter();
-            stations.map(|station| station.plc_bytes(area)).sum::<usize>()
+            stations
+                .map(|station| station.plc_bytes(area))
+                .sum::<usize>()
         };
         let (input, output) = (bytes(Area::Input), bytes(Area::Output));
         let signals = self.setup.table.signals.len();
@@ -197,8 +204,17 @@ impl<'a> Examination<'a> {
                 return None;
             }
         };
-        let texts: Vec<String> = addresses.iter().map(|found| found.ip().to_string()).collect();
-        self.ok("name", format!("{} is {}", address.host, texts.join(", ")));
+        let texts: Vec<String> = addresses
+            .iter()
+            .map(|found| found.ip().to_string())
+            .collect();
+        self.ok(
+            "name",
+            match &address.host {
+                Host::Ip(ip) => format!("{ip} is an IP address, and needs no look-up"),
+                Host::Name(name) => format!("{name} is {}", texts.join(", ")),
+            },
+        );
         let mut last = None;
         for address in addresses {
             match self.connect(address) {
@@ -225,7 +241,12 @@ impl<'a> Examination<'a> {
         if let Unreachable::NoRoute(error) = why {
             let next = "check the network of this computer: its address and mask must fit those of the PLC, and the \
                         cable and the adapter must be up";
-            self.fail("route", "no-route", format!("there is no way to {address} ({error})"), next);
+            self.fail(
+                "route",
+                "no-route",
+                format!("there is no way to {address} ({error})"),
+                next,
+            );
             return;
         }
         if let Ok(own) = route(address) {
@@ -262,7 +283,7 @@ impl<'a> Examination<'a> {
             return false;
         }
         let Err(error) = bind(address, None) else {
-            let is_local = matches!(&address.host, tickbus_net::Host::Ip(ip) if ip.is_loopback());
+            let is_local = matches!(&address.host, Host::Ip(ip) if ip.is_loopback());
             let step = self.ok("port", format!("{address} is free"));
             if is_local {
                 "only programs on this computer can connect; for a PLC, write the address of the network card, or \
@@ -288,7 +309,12 @@ impl<'a> Examination<'a> {
             ),
             _ => ("cannot-listen", "see the message of the system"),
         };
-        self.fail("port", cause, format!("{address} cannot be listened on ({error})"), next);
+        self.fail(
+            "port",
+            cause,
+            format!("{address} cannot be listened on ({error})"),
+            next,
+        );
         false
     }
 

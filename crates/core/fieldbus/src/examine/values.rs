@@ -22,8 +22,14 @@ impl Examination<'_> {
     /// How long values have to be watched: as configured, and a little longer than each sign of life needs, up to 10 s.
     pub fn watching(&self) -> Nanos {
         const LONGEST: Nanos = Nanos::from_secs(10);
-        let life = self.watched.iter().map(|(_, within)| *within + Nanos::from_millis(100));
-        life.max().unwrap_or(Nanos::ZERO).min(LONGEST).max(self.watch)
+        let life = self
+            .watched
+            .iter()
+            .map(|(_, within)| *within + Nanos::from_millis(100));
+        life.max()
+            .unwrap_or(Nanos::ZERO)
+            .min(LONGEST)
+            .max(self.watch)
     }
 
     /// Reads all values several times by `read`, which returns nothing once the connection has ended; the step `age`.
@@ -52,7 +58,13 @@ impl Examination<'_> {
 
     fn judge_age(&mut self, rounds: &[Round]) {
         let max_age = self.setup.max_age;
-        let longest = rounds.iter().map(|round| round.took).max().unwrap_or_default();
+        let longest = rounds
+            .iter()
+            .map(|round| round.took)
+            .max()
+            .unwrap_or_default();
+        // For people: microseconds of a reading, and milliseconds of a wait, are enough.
+        let longest = Nanos(longest.0 / 1000 * 1000);
         let [first, rest @ ..] = rounds else {
             return;
         };
@@ -60,7 +72,10 @@ impl Examination<'_> {
             let value = |round: &Round| round.values.get(signal).cloned();
             rest.iter().any(|round| value(round) != value(first))
         };
-        let span = rounds.last().map_or(Nanos::ZERO, |last| last.begin - first.begin);
+        let span = rounds
+            .last()
+            .map_or(Nanos::ZERO, |last| last.begin - first.begin);
+        let span = Nanos(span.0 / 1_000_000 * 1_000_000);
         if longest > max_age {
             self.fail(
                 "age",
@@ -71,7 +86,10 @@ impl Examination<'_> {
             return;
         }
         let signals = &self.setup.table.signals;
-        let still = self.watched.iter().find(|(signal, within)| *within < span && !changes(*signal));
+        let still = self
+            .watched
+            .iter()
+            .find(|(signal, within)| *within < span && !changes(*signal));
         if let Some((signal, within)) = still {
             let name = &signals[*signal].name;
             self.fail(

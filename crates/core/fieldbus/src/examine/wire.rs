@@ -45,7 +45,12 @@ pub enum WireEnd {
 
 impl Peer {
     /// A peer that must accept a connection within `connect`, and answer within `patience`.
-    pub fn new(address: SocketAddr, connect: Nanos, patience: Nanos, clock: &Arc<dyn Clock>) -> Self {
+    pub fn new(
+        address: SocketAddr,
+        connect: Nanos,
+        patience: Nanos,
+        clock: &Arc<dyn Clock>,
+    ) -> Self {
         Self {
             address,
             connect,
@@ -92,11 +97,18 @@ impl Peer {
     pub fn now(&self) -> Nanos {
         self.clock.now()
     }
+
+    /// The clock that counts the time-outs.
+    pub fn clock(&self) -> &dyn Clock {
+        &*self.clock
+    }
 }
 
 impl fmt::Debug for Wire {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Wire").field("socket", &self.socket).finish_non_exhaustive()
+        f.debug_struct("Wire")
+            .field("socket", &self.socket)
+            .finish_non_exhaustive()
     }
 }
 
@@ -130,7 +142,8 @@ impl Wire {
     ///
     /// The system has no more files.
     pub fn socket(&self) -> io::Result<TcpStream> {
-        self.socket.set_read_timeout(Some(self.patience.to_duration()))?;
+        self.socket
+            .set_read_timeout(Some(self.patience.to_duration()))?;
         self.socket.try_clone()
     }
 
@@ -146,7 +159,10 @@ impl Wire {
     ///
     /// The connection has ended.
     pub fn send(&mut self, bytes: &[u8]) -> Result<(), WireEnd> {
-        let sent = self.stream.write_all(bytes).and_then(|()| self.stream.flush());
+        let sent = self
+            .stream
+            .write_all(bytes)
+            .and_then(|()| self.stream.flush());
         sent.map_err(|error| WireEnd::of(&error))
     }
 

@@ -37,7 +37,10 @@ impl fmt::Display for Miss {
             Self::End(end) => end.fmt(f),
             Self::Alien(bytes) => {
                 let first = &bytes[..bytes.len().min(16)];
-                write!(f, "answers with bytes that are no Modbus telegram ({first:02X?})")
+                write!(
+                    f,
+                    "answers with bytes that are no Modbus telegram ({first:02X?})"
+                )
             }
             Self::Refused(exception) => write!(f, "answers {exception}"),
             Self::Malformed(why) => f.write_str(why),
@@ -83,7 +86,9 @@ impl Talk {
             if let Some(answer) = self.take(unit, pdu[0])? {
                 return Ok(answer);
             }
-            self.wire.receive(&mut self.inbox, deadline).map_err(Miss::End)?;
+            self.wire
+                .receive(&mut self.inbox, deadline)
+                .map_err(Miss::End)?;
         }
     }
 

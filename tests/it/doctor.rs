@@ -57,7 +57,7 @@ fn words(values: &[f32]) -> Vec<u16> {
         .collect()
 }
 
-const VALUES: [f32; 3] = [21.37, 3.25, 1500.5];
+const VALUES: [f32; 3] = [21.37, 0.73, 1500.53];
 
 /// A server kind with a free port, and a client that sends this request to it until it is answered or the test ends.
 fn asked(further: &str, signals: &str, request: &'static [u8]) -> String {
@@ -231,7 +231,7 @@ fn faults() -> Vec<Fault> {
                     ..registers()
                 }
                 .serve(),
-                "outputs = \"input-register:0\"",
+                "outputs = \"input-register:1\"",
                 WORD,
             ),
         ),
@@ -259,7 +259,7 @@ fn faults() -> Vec<Fault> {
                     ..registers()
                 }
                 .serve(),
-                "outputs = \"holding-register:3\"",
+                "outputs = \"offset:3\"",
                 REALS,
             ),
         ),
@@ -606,7 +606,7 @@ fn a_line_that_is_as_it_should_be_has_no_failures() {
             .replace("%QD0", "%QD2")
     );
     let alive =
-        "alive = { signal = \"Life\", within = \"200ms\" }\noutputs = \"holding-register:0\"";
+        "alive = { signal = \"Life\", within = \"200ms\" }\noutputs = \"holding-register:1\"";
     let block = words(&VALUES)
         .iter()
         .flat_map(|word| word.to_be_bytes())

@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use tickbus_base::statistics::entries;
 use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_base::toml_text::printable;
 use tickbus_driver::Driver;
@@ -18,6 +17,9 @@ pub struct Terms {
     /// How long a server waits for its PLC; zero for not at all.
     pub wait: Nanos,
 }
+
+/// The interval of the ticks while a server serves its PLC.
+const TICK: Nanos = Nanos::from_millis(10);
 
 /// Goes along the line of a driver.cfg. Texts of the peer are without control characters. A server that is to wait for its
 /// PLC answers it, with the fail-safe values; a client writes nothing.
@@ -76,7 +78,7 @@ fn serve(
     stop: &Stop,
     examination: &mut Examination<'_>,
 ) {
-    let driver = match Driver::open(config.clone(), Arc::clone(clock)) {
+    let mut driver = match Driver::open(config.clone(), Arc::clone(clock)) {
         Ok(driver) => driver,
         Err(error) => {
             let next = "correct what the message says";
@@ -84,14 +86,20 @@ fn serve(
             return;
         }
     };
+    // Without ticks a server answers nobody.
+    let mut slots = driver.initial_slots();
+    let end = clock.now() + wait;
+    while clock.now() < end && !stop.is_stopped() {
+        driver.exchange(None, &mut slots);
+        clock.wait_until(end.min(clock.now() + TICK), stop);
+    }
     let count = |counter: &str| {
         let statistics = driver.statistics();
-        let found = entries(&statistics).find(|(key, _)| key.ends_with(counter));
+        let mut values = statistics.lines().filter_map(|line| line.split_once('='));
+        let found = values.find(|(key, _)| *key == counter);
         let found = found.and_then(|(_, value)| value.parse::<u64>().ok());
         found.unwrap_or_default()
     };
-    let end = clock.now() + wait;
-    clock.wait_until(end, stop);
     let accepted = count("clients.accepted");
     let mut complaints = Vec::new();
     for complaint in config.bus.complaints() {

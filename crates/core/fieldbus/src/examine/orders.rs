@@ -179,10 +179,14 @@ impl Examination<'_> {
         let orders = ByteOrder::ALL.into_iter().map(Hypothesis::Order);
         let others = orders.chain([Hypothesis::Below, Hypothesis::Above]);
         let scored = others.filter_map(|other| Some((score(other, &judged)?, other)));
+        let scored: Vec<_> = scored.collect();
         // The first of equal ones: swapped words are more frequent than wrong places.
-        let best = scored.min_by_key(|((sum, suspicious), _)| (*suspicious, *sum));
+        let best = scored
+            .iter()
+            .copied()
+            .min_by_key(|((sum, suspicious), _)| (*suspicious, *sum));
         let best = best.filter(|((sum, suspicious), _)| *suspicious < own.1 && *sum < own.0);
-        let (cause, next) = match best.map(|(_, hypothesis)| hypothesis) {
+        let (cause, mut next) = match best.map(|(_, hypothesis)| hypothesis) {
             Some(Hypothesis::Order(ByteOrder::Cdab)) => (
                 "word-order",
                 "the words look swapped: write order = \"CDAB\" at these signals".to_owned(),
@@ -203,6 +207,14 @@ impl Examination<'_> {
                 "compare with the values in the PLC's own tool, and choose the reading that matches".to_owned(),
             ),
         };
+        let is_shift = |other| matches!(other, Hypothesis::Below | Hypothesis::Above);
+        if let Some((_, chosen)) = best
+            && scored
+                .iter()
+                .any(|((_, left), other)| *left == 0 && is_shift(*other) != is_shift(chosen))
+        {
+            next.push_str("; other readings are possible as well: compare them with the values in the PLC's own tool");
+        }
         let details: Vec<String> = judged
             .iter()
             .filter(|(neighbours, signal)| {

@@ -50,6 +50,13 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
         let why = format!("doctor: {mistake}");
         return arguments.format.fail("doctor", &why, Outcome::Usage);
     }
+    if arguments.wait.is_some() && config.bus.complaints().is_none() {
+        let why = format!(
+            "doctor: --wait is for a server, to which the PLC connects, and {} is none; leave it out",
+            config.bus.kind()
+        );
+        return arguments.format.fail("doctor", &why, Outcome::Usage);
+    }
     let clock: Arc<dyn Clock> = Monotonic::shared();
     let terms = Terms {
         watch: arguments.watch,

@@ -3,13 +3,13 @@
 use std::fmt::Write as _;
 use std::sync::Arc;
 
-use clap::builder::PossibleValuesParser;
 use serde_json::{Value, json};
 
 use super::columns::aligned;
 use super::json::{Format, print_document};
 use super::{Outcome, print};
 use tickbus_base::time::{Clock, Monotonic, Stop};
+use tickbus_base::toml_text::{did_you_mean, shown};
 use tickbus_driver_cfg::Kinds;
 use tickbus_finder::{Device, Findings, Plan, Target, addresses, find};
 
@@ -24,8 +24,8 @@ pub(super) struct Arguments {
     #[arg(required = true, value_name = "TARGET", value_parser = target)]
     targets: Vec<Target>,
 
-    /// Search for servers of these buses only [default: all].
-    #[arg(long, value_name = "BUS", value_delimiter = ',', value_parser = PossibleValuesParser::new(BUSES))]
+    /// Search for servers of these buses only: modbus, s7, opcua [default: all].
+    #[arg(long, value_name = "BUS", value_delimiter = ',')]
     bus: Vec<String>,
 
     /// Search at this port instead of the usual ones (502, 102, 4840).
@@ -48,9 +48,6 @@ pub(super) struct Arguments {
     format: Format,
 }
 
-/// The names of the buses that can be searched.
-const BUSES: [&str; 3] = ["modbus", "s7", "opcua"];
-
 fn target(text: &str) -> Result<Target, String> {
     text.parse()
         .map_err(|mistake: tickbus_base::Mistake| mistake.to_string())
@@ -65,6 +62,15 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
     // Without it Ctrl-C ends the search without its findings so far.
     let _ = ctrlc::set_handler(handler);
     let clock: Arc<dyn Clock> = Monotonic::shared();
+    let known: Vec<&str> = kinds.searches().iter().map(|search| search.bus).collect();
+    if let Some(unknown) = arguments.bus.iter().find(|bus| !known.contains(&&***bus)) {
+        let right = did_you_mean(unknown, "buses", &known);
+        let why = format!(
+            "find: no servers of \"{}\" can be found; {right}",
+            shown(unknown)
+        );
+        return arguments.format.fail("find", &why, Outcome::Usage);
+    }
     let is_wanted =
         |bus: &str| arguments.bus.is_empty() || arguments.bus.iter().any(|own| own == bus);
     let searches = kinds

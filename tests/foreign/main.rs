@@ -10,6 +10,7 @@ mod bridge_bus;
 #[path = "../peers/commands.rs"]
 mod commands;
 mod devices;
+mod doctor;
 #[path = "../it/fmi/fixture.rs"]
 mod fixture;
 mod fmi;
@@ -69,6 +70,7 @@ fn main() -> ExitCode {
         #[cfg(feature = "modbus-tls")]
         ("modbus_tls", modbus_tls::TESTS),
         ("devices", devices::TESTS),
+        ("doctor", doctor::TESTS),
         #[cfg(feature = "page")]
         ("observed_rig", observed_rig::TESTS),
         ("observer", observer::TESTS),

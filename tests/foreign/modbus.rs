@@ -349,12 +349,21 @@ impl Server {
         Self::at_address("tcp")
     }
 
-    fn at_address(mode: &str) -> Result<(Self, SocketAddr), Absent> {
+    pub(crate) fn at_address(mode: &str) -> Result<(Self, SocketAddr), Absent> {
+        Self::at_address_with(mode, &[])
+    }
+
+    /// As `at_address`, with further arguments.
+    pub(crate) fn at_address_with(
+        mode: &str,
+        further: &[&str],
+    ) -> Result<(Self, SocketAddr), Absent> {
         let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
         let address = listener.local_addr().expect("it is bound");
         drop(listener);
         let (ip, port) = (address.ip().to_string(), address.port().to_string());
-        Ok((Self::start(&[mode, &ip, &port])?, address))
+        let arguments = [&[mode, &ip, &port], further].concat();
+        Ok((Self::start(&arguments)?, address))
     }
 }
 

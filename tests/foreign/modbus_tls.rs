@@ -19,7 +19,7 @@ pub(crate) const TESTS: &[(&str, Test)] = &[
 ];
 
 /// An authority, and certificates: of a server at 127.0.0.1, of clients with and without a role, and of a stranger.
-fn make_certificates(folder: &Path) -> Result<(), Absent> {
+pub(crate) fn make_certificates(folder: &Path) -> Result<(), Absent> {
     const CURVE: &str = "-newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -days 30";
     const BY_CA: &str = "-CA ca.pem -CAkey ca.key -addext basicConstraints=CA:FALSE";
     const ROLE: &str = "-addext 1.3.6.1.4.1.50316.802.1=ASN1:UTF8String";
@@ -48,7 +48,7 @@ fn make_certificates(folder: &Path) -> Result<(), Absent> {
 }
 
 /// The table of an end with this certificate.
-fn tls(folder: &Path, own: &str, authority: &str, more: &str) -> String {
+pub(crate) fn tls(folder: &Path, own: &str, authority: &str, more: &str) -> String {
     let at = |name: String| folder.join(name).display().to_string();
     let (own, key) = (at(format!("{own}.pem")), at(format!("{own}.key")));
     let authority = at(format!("{authority}.pem"));

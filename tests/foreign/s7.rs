@@ -127,12 +127,12 @@ fn python_snap7_finds_places_and_names() -> Result<(), Absent> {
 /// A server of Snap7 with data blocks 1 and 2.
 pub(crate) struct Cpu {
     process: Child,
-    port: u16,
+    pub(crate) port: u16,
     out: BufReader<ChildStdout>,
 }
 
 impl Cpu {
-    fn start(python: Command, script: &str) -> Self {
+    pub(crate) fn start(python: Command, script: &str) -> Self {
         let free = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).expect("a free port");
         let port = free.local_addr().expect("it is bound").port();
         drop(free);
@@ -159,7 +159,7 @@ impl Cpu {
     }
 
     /// Sends it a line on stdin.
-    fn tell(&mut self, line: &str) {
+    pub(crate) fn tell(&mut self, line: &str) {
         let stdin = self.process.stdin.as_mut().expect("it was piped");
         writeln!(stdin, "{line}").expect("it reads");
     }
@@ -247,7 +247,7 @@ fn our_client_reads_and_writes_a_server_of_python_snap7() -> Result<(), Absent> 
 }
 
 /// The environment of the wheel that brings the C library.
-fn snap7_in_c() -> Result<Command, Absent> {
+pub(crate) fn snap7_in_c() -> Result<Command, Absent> {
     harness::python_with("snap7", &["snap7.common", "snap7.protocol"])
 }
 

@@ -1,6 +1,7 @@
 """An OPC UA server of asyncua, for tests of tickbus as its client.
 
-The only argument is JSON: {"url", "security": ["None", …], "folder", "user", "password", "nodes": {name: [type, value]}}.
+The only argument is JSON: {"url", "security": ["None", …], "folder", "user", "password", "nodes": {name: [type, value]},
+"denied": [name, …]}; clients cannot read nodes that are denied.
 It prints "ready" on stdout, then obeys a line of JSON from stdin at a time, and answers each with one:
     {"set": {name: value}}           writes good values
     {"status": {name: "Bad…"}}       writes the last value again, with that status
@@ -85,6 +86,9 @@ async def main():
             ua.NodeId(name, 2), name, ua.Variant(value, kinds[name])
         )
         await node.set_writable()
+        if name in asked.get("denied", []):
+            for attribute in (ua.AttributeIds.AccessLevel, ua.AttributeIds.UserAccessLevel):
+                await node.unset_attr_bit(attribute, ua.AccessLevel.CurrentRead)
         nodes[name] = node
     async with server:
         print("ready", flush=True)

@@ -132,8 +132,8 @@ impl BusOptions for ServerOptions {
         }
     }
 
-    fn complaints(&self) -> &'static [Complaint] {
-        COMPLAINTS
+    fn complaints(&self) -> Option<&'static [Complaint]> {
+        Some(COMPLAINTS)
     }
 }
 

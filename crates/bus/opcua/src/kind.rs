@@ -160,8 +160,8 @@ impl BusOptions for ServerOptions {
         }
     }
 
-    fn complaints(&self) -> &'static [Complaint] {
-        &[
+    fn complaints(&self) -> Option<&'static [Complaint]> {
+        Some(&[
             Complaint {
                 counter: "opcua.rejected_certificates",
                 cause: "certificate-unknown",
@@ -174,7 +174,7 @@ impl BusOptions for ServerOptions {
                 what: "the PLC's certificate belongs to another application",
                 next: "let the PLC make a certificate with its own ApplicationUri",
             },
-        ]
+        ])
     }
 }
 

@@ -3,7 +3,7 @@
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Key, Table, shown};
-use tickbus_fieldbus::examine::{Examination, Search};
+use tickbus_fieldbus::examine::{Complaint, Examination, Search};
 use tickbus_fieldbus::faults::{AnswerCodes, WrongAnswer};
 use tickbus_fieldbus::tcp::Writers;
 use tickbus_fieldbus::{
@@ -99,6 +99,10 @@ impl BusOptions for ServerOptions {
         if examination.can_listen(&self.address) {
             examination.sizes("the PLC asks for what it needs");
         }
+    }
+
+    fn complaints(&self) -> Option<&'static [Complaint]> {
+        Some(&[])
     }
 }
 

@@ -216,9 +216,9 @@ pub trait BusOptions: AnyOptions {
         examination.unexamined("a line of this kind");
     }
 
-    /// The counters of a server that show what its clients do wrong.
-    fn complaints(&self) -> &'static [Complaint] {
-        &[]
+    /// The counters that show what the clients of a server do wrong; `None` for a bus that is no server.
+    fn complaints(&self) -> Option<&'static [Complaint]> {
+        None
     }
 
     /// The pairs of a signal that is written and one that is read at the same place, by their positions in the table.

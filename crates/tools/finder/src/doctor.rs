@@ -2,12 +2,13 @@
 
 use std::sync::Arc;
 
+use crate::finding::{Device, speaks};
 use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_base::toml_text::printable;
 use tickbus_driver::Driver;
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::BusSetup;
-use tickbus_fieldbus::examine::{Examination, Step, Verdict};
+use tickbus_fieldbus::examine::{Complaint, Examination, Step, Verdict};
 
 /// The times of an examination.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,9 +50,17 @@ pub fn examine(config: &Config, terms: Terms, clock: &Arc<dyn Clock>, stop: &Sto
         format!("{} is right: {}", config.path.display(), config.bus.kind()),
     );
     config.bus.examine(&mut examination);
-    let listens = !config.bus.complaints().is_empty() && !examination.has_failed();
-    if listens && terms.wait > Nanos::ZERO {
-        serve(config, terms.wait, clock, stop, &mut examination);
+    recognise(config, clock, &mut examination);
+    if let Some(complaints) = config.bus.complaints()
+        && terms.wait > Nanos::ZERO
+        && !examination.has_failed()
+    {
+        serve(
+            config,
+            complaints,
+            (terms.wait, clock, stop),
+            &mut examination,
+        );
     }
     let mut steps = examination.steps;
     for step in &mut steps {
@@ -70,12 +79,42 @@ pub fn cause(steps: &[Step]) -> Option<&'static str> {
     of(Verdict::Fail).or_else(|| of(Verdict::Warn))
 }
 
+/// Whether a peer that does not speak the bus of the file speaks another one.
+fn recognise(config: &Config, clock: &Arc<dyn Clock>, examination: &mut Examination<'_>) {
+    const STRANGE: [&str; 5] = [
+        "silent",
+        "connection-limit",
+        "not-modbus",
+        "not-s7",
+        "not-opcua",
+    ];
+    let Some(address) = examination.reached else {
+        return;
+    };
+    let is_strange = |step: &&mut Step| {
+        step.name == "protocol" && step.cause.is_some_and(|cause| STRANGE.contains(&cause))
+    };
+    let Some(step) = examination.steps.iter_mut().find(is_strange) else {
+        return;
+    };
+    let mut others = config.kinds.searches();
+    others.retain(|search| !config.bus.kind().starts_with(search.bus));
+    if let Some(device) = speaks(address, &others, clock) {
+        let Device { bus, found, .. } = device;
+        step.cause = Some("another-bus");
+        step.evidence = format!(
+            "{}; but it answers as {bus}: {}",
+            step.evidence, found.identity
+        );
+        step.next = format!("correct the port, or the kind of bus: write kind = \"{bus}-client\"");
+    }
+}
+
 /// Serves the PLC for a while, and reports what it asked for in vain: the steps `client` and `requests`.
 fn serve(
     config: &Config,
-    wait: Nanos,
-    clock: &Arc<dyn Clock>,
-    stop: &Stop,
+    all: &[Complaint],
+    (wait, clock, stop): (Nanos, &Arc<dyn Clock>, &Stop),
     examination: &mut Examination<'_>,
 ) {
     let mut driver = match Driver::open(config.clone(), Arc::clone(clock)) {
@@ -89,8 +128,10 @@ fn serve(
     // Without ticks a server answers nobody.
     let mut slots = driver.initial_slots();
     let end = clock.now() + wait;
+    let mut was_there = false;
     while clock.now() < end && !stop.is_stopped() {
         driver.exchange(None, &mut slots);
+        was_there |= driver.fact("clients").is_some_and(|clients| clients != "0");
         clock.wait_until(end.min(clock.now() + TICK), stop);
     }
     let count = |counter: &str| {
@@ -102,14 +143,14 @@ fn serve(
     };
     let accepted = count("clients.accepted");
     let mut complaints = Vec::new();
-    for complaint in config.bus.complaints() {
+    for complaint in all {
         match count(complaint.counter) {
             0 => {}
             times => complaints.push((complaint, times)),
         }
     }
     driver.close();
-    if accepted == 0 {
+    if accepted == 0 && complaints.is_empty() && !was_there {
         examination.fail(
             "client",
             "nobody-connects",
@@ -118,7 +159,7 @@ fn serve(
         );
         return;
     }
-    examination.ok("client", format!("{accepted} connections within {wait}"));
+    examination.ok("client", format!("somebody has connected within {wait}"));
     if complaints.is_empty() {
         examination.ok("requests", "all requests were answered");
     }

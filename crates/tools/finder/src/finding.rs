@@ -170,6 +170,28 @@ fn ask(
     Vec::new()
 }
 
+/// The device at an address, if it speaks one of these buses.
+pub(crate) fn speaks(
+    address: SocketAddr,
+    searches: &[Search],
+    clock: &Arc<dyn Clock>,
+) -> Option<Device> {
+    let peer = Peer::new(address, CONNECT, ANSWER, clock);
+    searches.iter().find_map(|search| {
+        let searching = Searching {
+            peer: peer.clone(),
+            wire: peer.dial().ok()?,
+            units: &[],
+        };
+        let found = (search.ask)(searching).into_iter().next()?;
+        Some(Device {
+            address,
+            bus: search.bus,
+            found: legible(found),
+        })
+    })
+}
+
 /// Texts of a device as text: a terminal or a file must not take them for commands.
 fn legible(found: Found) -> Found {
     let Found {

@@ -17,8 +17,8 @@ use crate::pki::{Pki, meaning};
 use crate::reactor::{Driven, Reactor};
 use crate::{ClientOptions, Policy, hello};
 use tickbus_base::time::{Clock, Nanos};
+use tickbus_fieldbus::PlcState;
 use tickbus_fieldbus::examine::{Examination, Peer, Round};
-use tickbus_fieldbus::{BusError, PlcState};
 
 /// The time for a server to answer a question; with certificates it computes for a while.
 const PATIENCE: Nanos = Nanos::from_secs(10);
@@ -79,12 +79,8 @@ pub(crate) fn examine(options: &ClientOptions, examination: &mut Examination<'_>
     if let Ok(fields) = fields(options, &examination.setup) {
         let nodes = addresses(&line, examination, (&session, &server), &fields);
         run_state(&line, examination, &session);
-        let wanted = nodes
-            .iter()
-            .map(|node| ReadValueId::new_value(node.clone()));
-        let wanted: Vec<ReadValueId> = wanted.collect();
-        if !wanted.is_empty() {
-            examination.watch_values(|| round(&line, &session, &wanted));
+        if !nodes.is_empty() {
+            examination.watch_values(|| round(&line, &session, &nodes, fields.len()));
         }
     }
     line.reactor
@@ -217,7 +213,7 @@ fn open(
             Some(opened)
         }
         Some(Err(Unopened { status, error })) => {
-            let (cause, next) = refused(status, line.options.security != Policy::None);
+            let (cause, next) = refused(status, line);
             let why = format!("{error} ({status})");
             examination.fail("session", cause, why, next);
             None
@@ -236,7 +232,7 @@ fn open(
 }
 
 /// The cause behind the status with which a server refuses a session, and the next thing to try.
-fn refused(status: StatusCode, is_secure: bool) -> (&'static str, &'static str) {
+fn refused(status: StatusCode, line: &Line<'_>) -> (&'static str, &'static str) {
     match status {
         StatusCode::BadTooManySessions
         | StatusCode::BadMaxConnectionsReached
@@ -247,11 +243,14 @@ fn refused(status: StatusCode, is_secure: bool) -> (&'static str, &'static str) 
         StatusCode::BadIdentityTokenRejected
         | StatusCode::BadIdentityTokenInvalid
         | StatusCode::BadUserAccessDenied
-        | StatusCode::BadUserSignatureInvalid => (
-            "user-refused",
-            "check the user and the password, and the rights of the user in the server",
-        ),
-        _ if is_secure => (
+        | StatusCode::BadUserSignatureInvalid => match line.login {
+            None => ("user-required", "add user and password_file"),
+            Some(_) => (
+                "user-refused",
+                "check the user and the password, and the rights of the user in the server",
+            ),
+        },
+        _ if line.options.security != Policy::None => (
             "certificate-refused",
             "let the server trust the certificate of this driver: it is in the folder pki, and perhaps among those that \
              the server has rejected",
@@ -266,18 +265,18 @@ struct Trouble {
     what: String,
 }
 
-/// The step `addresses`; returns the nodes that can be read.
+/// The step `addresses`; returns the nodes that can be read, with the positions of their signals.
 fn addresses(
     line: &Line<'_>,
     examination: &mut Examination<'_>,
     (session, server): (&Session, &Server),
     fields: &[Field],
-) -> Vec<NodeId> {
+) -> Vec<(usize, NodeId)> {
     let mut good = Vec::new();
     let mut troubles = Vec::new();
-    for field in fields.iter().take(SINGLES) {
+    for (signal, field) in fields.iter().enumerate().take(SINGLES) {
         match look(line, (session, server), field) {
-            Ok(node) => good.push(node),
+            Ok(node) => good.push((signal, node)),
             Err(trouble) => troubles.push(trouble),
         }
     }
@@ -430,15 +429,25 @@ fn run_state(line: &Line<'_>, examination: &mut Examination<'_>, session: &Sessi
     }
 }
 
-fn round(line: &Line<'_>, session: &Session, wanted: &[ReadValueId]) -> Option<Round> {
+fn round(
+    line: &Line<'_>,
+    session: &Session,
+    nodes: &[(usize, NodeId)],
+    signals: usize,
+) -> Option<Round> {
     let begin = line.clock.now();
-    let values: Result<Vec<DataValue>, BusError> = line.drive(nodes::read(session, wanted))?;
-    let values = values.ok()?.into_iter();
+    let wanted = nodes
+        .iter()
+        .map(|(_, node)| ReadValueId::new_value(node.clone()));
+    let wanted: Vec<ReadValueId> = wanted.collect();
+    let read = line.drive(nodes::read(session, &wanted))?.ok()?;
+    let mut values = vec![Vec::new(); signals];
+    for ((signal, _), value) in nodes.iter().zip(read) {
+        values[*signal] = format!("{:?}", value.value).into_bytes();
+    }
     Some(Round {
         begin,
         took: line.clock.now() - begin,
-        values: values
-            .map(|value| format!("{:?}", value.value).into_bytes())
-            .collect(),
+        values,
     })
 }

@@ -1,118 +1,22 @@
 //! The steps of an examination that are S7's own: transport, protocol, identity, each signal's bytes, and the operating
-//! state; and the search for CPUs.
+//! state.
+
+mod causes;
+mod talk;
 
 use super::plan::Field;
-use super::{
-    ClientOptions, ClientSession, ConnectionParameters, End, FrameFields, Refusal, SessionEvent,
-};
-use crate::item::{Object, ReturnCode};
-use crate::length::LONGEST;
-use crate::pdu::error;
-use crate::szl::Identity;
-use crate::transport::PORT;
+use super::{ClientOptions, End, FrameFields, Refusal};
 use crate::{ProtocolError, Tsap, Variable};
+use causes::{item_refusal, whole_refusal};
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::PlcState;
-use tickbus_fieldbus::examine::{
-    Examination, Found, Neighbours, Peer, Round, Search, Searching, Wire, WireEnd,
-};
-use tickbus_image::signal::{Signal, SignalTable};
+use tickbus_fieldbus::examine::{Examination, Neighbours, Peer, Round, WireEnd};
+use tickbus_image::signal::SignalTable;
 
-/// How CPUs are found.
-pub(crate) const SEARCH: Search = Search {
-    bus: "s7",
-    port: PORT,
-    ask,
-};
-
-/// The racks and slots of CPUs: S7-1200 and S7-1500, S7-300, software controllers, S7-400.
-const SLOTS: [(u8, u8); 4] = [(0, 1), (0, 2), (0, 0), (0, 3)];
+pub(super) use talk::{Miss, SLOTS, Talk, meets};
 
 /// How far the neighbours of a number lie, in bytes: a WORD.
 const STEP: usize = 2;
-
-/// Why a conversation ended.
-#[derive(Clone, Debug, PartialEq, Eq)]
-enum Miss {
-    Wire(WireEnd),
-    Session(End),
-}
-
-/// A session on a connection that blocks.
-struct Talk {
-    wire: Wire,
-    session: ClientSession,
-    peer: Peer,
-}
-
-impl Talk {
-    fn new(
-        wire: Wire,
-        peer: &Peer,
-        fields: &FrameFields,
-        (calling, called): (Tsap, Tsap),
-        pdu: u16,
-        asks_who: bool,
-    ) -> Self {
-        let terms = ConnectionParameters {
-            calling,
-            called,
-            pdu,
-            patience: peer.patience(),
-            asks_who,
-        };
-        Self {
-            wire,
-            session: fields.session(terms, peer.now()),
-            peer: peer.clone(),
-        }
-    }
-
-    /// Waits for the session's next news.
-    fn news(&mut self) -> Result<SessionEvent, Miss> {
-        let mut bytes = Vec::new();
-        loop {
-            let heard = self.session.hear(self.peer.now(), &bytes);
-            if let Some(news) = heard.map_err(Miss::Session)? {
-                return Ok(news);
-            }
-            bytes.clear();
-            let out = self.session.to_write().to_vec();
-            if !out.is_empty() {
-                self.wire.send(&out).map_err(Miss::Wire)?;
-                self.session.wrote(out.len());
-            }
-            let deadline = self.wire.deadline();
-            self.wire
-                .receive(&mut bytes, deadline)
-                .map_err(Miss::Wire)?;
-        }
-    }
-
-    /// The agreed length of a PDU, and the identity.
-    fn meet(&mut self) -> Result<(u16, Option<Identity>), Miss> {
-        match self.news()? {
-            SessionEvent::Met(length, identity) => Ok((length, identity)),
-            _ => Ok((0, None)),
-        }
-    }
-
-    /// Reads all fields of the session.
-    fn read(&mut self) -> Result<(), Miss> {
-        if self.session.begin(self.peer.now()).is_none() {
-            self.news()?;
-        }
-        Ok(())
-    }
-
-    fn state(&mut self) -> Result<Option<PlcState>, Miss> {
-        self.session.ask_state(self.peer.now());
-        match self.news()? {
-            SessionEvent::State(state) => Ok(state),
-            _ => Ok(None),
-        }
-    }
-}
 
 /// The fields of an examination: each signal's own bytes, and those before and behind it, each in a frame of its own, so
 /// that a refusal is known for each of them. Nothing is written.
@@ -169,7 +73,10 @@ impl ClientOptions {
         }
         let (length, identity) = match met {
             Ok(met) => met,
-            Err(miss) => return self.strange(examination, &peer, &miss),
+            Err(miss) => {
+                talk.hang_up();
+                return self.strange(examination, &peer, &miss);
+            }
         };
         examination.ok(
             "protocol",
@@ -191,6 +98,7 @@ impl ClientOptions {
         }
         state(examination, &mut talk);
         self.second_client(examination, &peer);
+        talk.hang_up();
         let Ok(wire) = peer.dial() else {
             return;
         };
@@ -358,16 +266,6 @@ impl ClientOptions {
     }
 }
 
-/// A short conversation with another end; the length of a PDU, and the identity.
-fn meets(peer: &Peer, ends: (Tsap, Tsap)) -> Option<(u16, Option<Identity>)> {
-    let fields = FrameFields {
-        lengths: vec![[0, 0]],
-        ..FrameFields::default()
-    };
-    let mut talk = Talk::new(peer.dial().ok()?, peer, &fields, ends, LONGEST, false);
-    talk.meet().ok()
-}
-
 fn state(examination: &mut Examination<'_>, talk: &mut Talk) {
     match talk.state() {
         Ok(Some(PlcState::Run)) => {
@@ -386,61 +284,6 @@ fn state(examination: &mut Examination<'_>, talk: &mut Talk) {
             "name a signal that has to change: alive = { signal = \"...\", within = \"500ms\" }"
                 .clone_into(&mut step.next);
         }
-    }
-}
-
-/// The cause if the CPU refused a whole job, the evidence and the next thing to try.
-fn whole_refusal(miss: &Miss) -> (&'static str, String, String) {
-    match miss {
-        Miss::Session(End::Refused(refusal)) => {
-            let cause = match refusal {
-                Refusal::Job(error::NO_FUNCTION) => "put-get",
-                Refusal::Job(0xD241) => "protection-level",
-                _ => "job-refused",
-            };
-            let text = refusal.to_string();
-            let (told, next) = text
-                .split_once("; ")
-                .unwrap_or((&text, "see its diagnostic buffer"));
-            (cause, format!("the CPU {told}"), next.to_owned())
-        }
-        Miss::Session(end) => {
-            let why = end.clone().into_error("the CPU").to_string();
-            ("not-s7", why, "see what the peer is".to_owned())
-        }
-        Miss::Wire(end) => (
-            "connection-lost",
-            format!("the CPU {end} when the signals are read"),
-            "write a smaller \"pdu\", and see the diagnostic buffer of the CPU".to_owned(),
-        ),
-    }
-}
-
-/// The cause if the CPU refused single items, and the next thing to try.
-fn item_refusal(refused: &[(&Signal, Refusal)]) -> (&'static str, &'static str) {
-    let first = refused.first().map(|(_, refusal)| refusal);
-    let Some(Refusal::Item { item, code, .. }) = first else {
-        return ("job-refused", "see the diagnostic buffer of the CPU");
-    };
-    match (item.object, *code) {
-        (Object::Block(_), ReturnCode::MISSING) => (
-            "block-missing",
-            "load the block into the CPU; if it is there, it has optimized block access: clear that in its properties, \
-             under Attributes, compile and load it",
-        ),
-        (Object::Block(_), ReturnCode::ADDRESS) => (
-            "block-short",
-            "the block is shorter than the file assumes: compare the offsets in its declaration, and compile and load it",
-        ),
-        (_, ReturnCode::ADDRESS | ReturnCode::MISSING) => (
-            "address-refused",
-            "the CPU has no such addresses: correct \"input\", \"output\" or [fieldbus.at]",
-        ),
-        (_, ReturnCode::ACCESS) => (
-            "access-denied",
-            "allow full access and PUT/GET communication in the properties of the CPU; a block must not be protected",
-        ),
-        _ => ("item-refused", "see the diagnostic buffer of the CPU"),
     }
 }
 
@@ -475,47 +318,4 @@ fn round(talk: &mut Talk, table: &SignalTable) -> Option<Round> {
         took,
         values,
     })
-}
-
-/// Asks for the identity, at each of the usual racks and slots until one answers.
-fn ask(searching: Searching<'_>) -> Vec<Found> {
-    let Searching { peer, wire, .. } = searching;
-    let fields = FrameFields {
-        lengths: vec![[0, 0]],
-        ..FrameFields::default()
-    };
-    let calling = Tsap::new(&super::options::CALLING);
-    let mut first = Some(wire);
-    for (rack, slot) in SLOTS {
-        let ends = (calling, Tsap::of_slot(rack, slot));
-        let Some(wire) = first.take().or_else(|| peer.dial().ok()) else {
-            return Vec::new();
-        };
-        let mut talk = Talk::new(wire, &peer, &fields, ends, LONGEST, true);
-        let identity = match talk.meet() {
-            Ok((_, identity)) => identity,
-            Err(Miss::Session(End::Broken(
-                ProtocolError::NoIsoOnTcp(_) | ProtocolError::PacketLength(_),
-            ))) => return Vec::new(),
-            Err(_) if talk.session.asks_who() => {
-                meets(&peer, ends).and_then(|(_, identity)| identity)
-            }
-            // What falls silent at the first slot is no CPU; a CPU refuses, or closes the connection.
-            Err(Miss::Wire(WireEnd::Silent)) => return Vec::new(),
-            Err(_) => continue,
-        };
-        return vec![describe(&peer, (rack, slot), identity.as_ref())];
-    }
-    Vec::new()
-}
-
-fn describe(peer: &Peer, (rack, slot): (u8, u8), identity: Option<&Identity>) -> Found {
-    Found {
-        identity: identity.map(Identity::line).unwrap_or_default(),
-        facts: vec![("rack", rack.to_string()), ("slot", slot.to_string())],
-        stanza: format!(
-            "[fieldbus]\nkind    = \"s7-client\"\naddress = \"{}\"\nrack    = {rack}\nslot    = {slot}\n",
-            peer.address
-        ),
-    }
 }

@@ -8,6 +8,7 @@ mod options;
 mod parameters;
 mod plan;
 mod refusal;
+mod search;
 mod session;
 mod traffic;
 
@@ -18,12 +19,12 @@ use tickbus_fieldbus::{BusError, CYCLE, Free, Medium, PlcState, Port, Role, Writ
 use tickbus_image::signal::SignalTable;
 
 use connection::Connection;
-pub(crate) use examine::SEARCH;
 pub use frames::FrameFields;
 pub use options::ClientOptions;
 pub(crate) use options::IDENTITY_LIMIT;
 pub use parameters::{ConnectionParameters, End, SessionEvent};
 pub use refusal::Refusal;
+pub(crate) use search::SEARCH;
 pub use session::ClientSession;
 
 /// The shortest time-out of an answer; otherwise it is four times `max_age`.

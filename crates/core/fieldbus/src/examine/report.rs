@@ -61,6 +61,8 @@ pub struct Examination<'a> {
     pub patience: Nanos,
     /// Ends the examination early.
     pub stop: &'a Stop,
+    /// The address of the peer, once it has accepted a connection.
+    pub reached: Option<SocketAddr>,
     /// The steps so far.
     pub steps: Vec<Step>,
 }
@@ -84,6 +86,7 @@ impl<'a> Examination<'a> {
             watch,
             patience,
             stop,
+            reached: None,
             steps: Vec::new(),
         }
     }
@@ -232,6 +235,7 @@ impl<'a> Examination<'a> {
         let own = route(address)?;
         let peer = Peer::new(address, Self::CONNECT, self.patience, self.setup.clock);
         let wire = peer.dial()?;
+        self.reached = Some(address);
         self.ok("route", format!("from {own}"));
         self.ok("port", format!("{address} accepts connections"));
         Ok((peer, wire))

@@ -2,7 +2,7 @@
 
 use std::fmt;
 use std::io::{self, ErrorKind, Read, Write};
-use std::net::{SocketAddr, TcpStream};
+use std::net::{Shutdown, SocketAddr, TcpStream};
 use std::sync::Arc;
 
 use tickbus_base::time::{Clock, Nanos};
@@ -151,6 +151,12 @@ impl Wire {
     #[must_use]
     pub fn within(self, stream: Box<dyn Plain>) -> Self {
         Self { stream, ..self }
+    }
+
+    /// Ends the connection: some peers serve one at a time.
+    pub fn hang_up(&self) {
+        // If this fails, the connection has ended already.
+        let _ = self.socket.shutdown(Shutdown::Both);
     }
 
     /// Sends all of `bytes`.

@@ -69,6 +69,11 @@ impl Talk {
         }
     }
 
+    /// Ends the connection, so that a device with a single one accepts the next.
+    pub(in crate::client) fn hang_up(&self) {
+        self.wire.hang_up();
+    }
+
     /// Sends a PDU, and returns that of the answer, which may be an exception.
     fn exchange(&mut self, unit: u8, pdu: &[u8]) -> Result<Vec<u8>, Miss> {
         let mut request = Vec::new();
@@ -189,8 +194,40 @@ fn legible(bytes: &[u8]) -> String {
     texts.join(" ")
 }
 
+/// The beginning of TLS 1.2: a `ClientHello` (RFC 5246, 7.4.1.2; its extensions RFC 8422, 5.1). Every build has it, with or
+/// without a stack for TLS.
+fn client_hello() -> Vec<u8> {
+    let version = [3, 3];
+    // ECDHE with AES-128-GCM, for certificates with ECDSA and with RSA.
+    let suites = [0, 4, 0xC0, 0x2B, 0xC0, 0x2F];
+    let extensions: [&[u8]; 3] = [
+        // The groups x25519 and secp256r1.
+        &[0, 10, 0, 6, 0, 4, 0, 29, 0, 23],
+        // Uncompressed points.
+        &[0, 11, 0, 2, 1, 0],
+        // Signatures with SHA-256: ECDSA, RSA-PSS and RSA.
+        &[0, 13, 0, 8, 0, 6, 4, 3, 8, 4, 4, 1],
+    ];
+    let extensions = extensions.concat();
+    let short = |length: usize| u16::try_from(length).unwrap_or(u16::MAX).to_be_bytes();
+    // The random bytes need not be random, as no connection follows.
+    let mut hello = [&version[..], &[0x5A; 32], &[0], &suites, &[1, 0]].concat();
+    hello.extend(short(extensions.len()));
+    hello.extend(extensions);
+    let handshake = [&[1, 0][..], &short(hello.len()), &hello].concat();
+    [&[0x16, 3, 1][..], &short(handshake.len()), &handshake].concat()
+}
+
+/// True if the device answers the beginning of TLS with TLS.
+pub(super) fn speaks_tls(mut wire: Wire) -> bool {
+    let deadline = wire.deadline();
+    let mut answer = Vec::new();
+    let asked = wire.send(&client_hello());
+    asked.is_ok() && wire.receive(&mut answer, deadline).is_ok() && protocol(&answer) == Some("TLS")
+}
+
 /// The protocol that begins an answer with these bytes.
-pub(in crate::client) fn protocol(bytes: &[u8]) -> Option<&'static str> {
+pub(super) fn protocol(bytes: &[u8]) -> Option<&'static str> {
     Some(match bytes {
         [0x15 | 0x16, 3, ..] => "TLS",
         [3, 0, ..] => "ISO on TCP, as S7 does",

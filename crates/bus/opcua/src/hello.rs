@@ -1,17 +1,9 @@
 //! The first message of a connection and its answer (OPC 10000-6, 7.1.2): whether a peer speaks OPC UA at all. Needs no
 //! stack, so every build has it.
 
-use tickbus_fieldbus::examine::{Examination, Found, Search, Searching, Wire, WireEnd};
+use tickbus_fieldbus::examine::{Examination, Wire, WireEnd};
 
 use super::Url;
-use super::url::PORT;
-
-/// How OPC UA servers are found.
-pub(crate) const SEARCH: Search = Search {
-    bus: "opcua",
-    port: PORT,
-    ask,
-};
 
 /// Bytes of the header of a message: its type, a chunk type, its length.
 const HEADER: usize = 8;
@@ -70,7 +62,7 @@ fn read(bytes: &[u8]) -> Option<Answer> {
 }
 
 /// Says hello to the server at `url`.
-fn greet(wire: &mut Wire, url: &str) -> Answer {
+pub(crate) fn greet(wire: &mut Wire, url: &str) -> Answer {
     if let Err(end) = wire.send(&message(url)) {
         return Answer::End(end);
     }
@@ -136,26 +128,6 @@ pub(crate) fn says_hello(examination: &mut Examination<'_>, wire: &mut Wire, url
     };
     examination.fail("protocol", cause, told, next);
     false
-}
-
-fn ask(searching: Searching<'_>) -> Vec<Found> {
-    let Searching { peer, mut wire, .. } = searching;
-    let url = format!("opc.tcp://{}", peer.address);
-    match greet(&mut wire, &url) {
-        Answer::Acknowledged | Answer::Refused(..) => {}
-        Answer::Alien(_) | Answer::End(_) => return Vec::new(),
-    }
-    #[cfg(feature = "opcua")]
-    let (identity, facts, security) = super::client::found(&peer, &url);
-    #[cfg(not(feature = "opcua"))]
-    let (identity, facts, security) = (String::new(), Vec::new(), "Basic256Sha256");
-    vec![Found {
-        identity,
-        facts,
-        stanza: format!(
-            "[fieldbus]\nkind     = \"opcua-client\"\nurl      = \"{url}\"\nsecurity = \"{security}\"\n"
-        ),
-    }]
 }
 
 #[cfg(test)]

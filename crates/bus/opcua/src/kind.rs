@@ -12,13 +12,14 @@ use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, NamedFile, OpenEr
 use tickbus_image::signal::{Signal, SignalTable};
 
 use super::codes::CODES;
+#[cfg(not(feature = "opcua"))]
 use super::hello;
-use super::{ClientOptions, ServerOptions, keys, options, security};
+use super::{ClientOptions, ServerOptions, keys, options, search, security};
 
 impl BusKind for ClientOptions {
     const NAME: &'static str = "opcua-client";
     const CAN_OBSERVE: bool = true;
-    const SEARCH: Option<Search> = Some(hello::SEARCH);
+    const SEARCH: Option<Search> = Some(search::SEARCH);
     const KEYS: &'static [&'static [Key]] = &[keys::CLIENT, security::KEYS];
 
     fn read(_role: Role, moved: bool, table: &mut Table<'_>) -> Option<Self> {

@@ -13,6 +13,7 @@ mod member;
 mod namespaces;
 mod node;
 mod options;
+mod search;
 mod security;
 mod url;
 

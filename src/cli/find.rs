@@ -48,6 +48,9 @@ pub(super) struct Arguments {
     format: Format,
 }
 
+/// The most rows for ports that speak none of the buses: some firewalls accept connections to every address.
+const UNKNOWN: usize = 10;
+
 fn target(text: &str) -> Result<Target, String> {
     text.parse()
         .map_err(|mistake: tickbus_base::Mistake| mistake.to_string())
@@ -145,7 +148,7 @@ fn report(findings: &Findings, with_tables: bool) -> String {
         ]
     });
     let mut rows: Vec<Vec<String>> = rows.collect();
-    rows.extend(findings.unknown.iter().map(|address| {
+    rows.extend(findings.unknown.iter().take(UNKNOWN).map(|address| {
         let what = "accepts connections, and speaks none of these buses".to_owned();
         vec![address.to_string(), "?".to_owned(), String::new(), what]
     }));
@@ -162,6 +165,13 @@ fn report(findings: &Findings, with_tables: bool) -> String {
                 device.address, device.found.identity, device.found.stanza
             );
         }
+    }
+    if let Some(more) = findings.unknown.len().checked_sub(UNKNOWN + 1) {
+        let _ = writeln!(
+            out,
+            "{} more ports accept connections, and speak none of these buses",
+            more + 1
+        );
     }
     let swept = findings.swept;
     let _ = writeln!(

@@ -36,6 +36,7 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
         role,
         program: Box::new(Axes::new(&axes)),
         has_replies: true,
+        bus: None,
         interval: arguments.tick,
     };
     host::run(job, &arguments.host)

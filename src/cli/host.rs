@@ -12,6 +12,7 @@ use super::json::{Format, print_document};
 use crate::page::{self, PageError, Place};
 use tickbus_base::statistics::entries;
 use tickbus_base::time::{Clock, Monotonic, Nanos, Stop};
+use tickbus_base::toml_text::Mistakes;
 use tickbus_driver::{Host, Watch};
 use tickbus_driver_cfg::{CommandLineEnd, Config, Kinds, PageOptions};
 use tickbus_fieldbus::faults::{FaultStatus, Phase};
@@ -129,6 +130,8 @@ pub(super) struct Job<'a> {
     pub(super) program: Box<dyn Program>,
     /// True if the replies of the file are made.
     pub(super) has_replies: bool,
+    /// The kind of bus in the place of the file's own.
+    pub(super) bus: Option<&'a str>,
     pub(super) interval: Nanos,
 }
 
@@ -143,6 +146,12 @@ fn configure(job: &Job<'_>, arguments: &Hosting) -> Result<Config, Outcome> {
         Ok(config) => config,
         Err(mistakes) => return Err(format.refuse(title, &mistakes)),
     };
+    if let Some(kind) = job.bus {
+        config = match on_bus(config, kind) {
+            Ok(config) => config,
+            Err(mistakes) => return Err(format.refuse(title, &mistakes)),
+        };
+    }
     if let Some(address) = &arguments.address
         && let Err(error) = config.bus.set_address(address)
     {
@@ -169,6 +178,15 @@ fn configure(job: &Job<'_>, arguments: &Hosting) -> Result<Config, Outcome> {
     if let Some(page) = &arguments.page {
         page.ask(&mut config);
     }
+    Ok(config)
+}
+
+/// Returns the same driver on a bus of this kind with its defaults, and with its own page.
+fn on_bus(mut config: Config, kind: &str) -> Result<Config, Mistakes> {
+    let page = config.page.take();
+    let text = format!("[fieldbus]\nkind = {}\n", json!(kind));
+    let mut config = config.overlaid("--bus", &text)?;
+    config.page = page;
     Ok(config)
 }
 

@@ -14,6 +14,11 @@ pub(super) struct Format {
 }
 
 impl Format {
+    /// The same format, for a command within this one.
+    pub(super) const fn same(&self) -> Self {
+        Self { json: self.json }
+    }
+
     /// Returns true if stdout has one JSON document, and nothing else.
     pub(super) fn is_json(&self) -> bool {
         self.json

@@ -55,6 +55,7 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
             Box::new(Mirror)
         },
         has_replies: arguments.replies,
+        bus: None,
         interval: arguments.tick,
     };
     host::run(job, &arguments.host)

@@ -29,6 +29,7 @@ mod json;
 mod lab;
 mod latency;
 mod logo;
+mod machine;
 mod man;
 mod mirror;
 mod new;
@@ -85,6 +86,7 @@ enum Command {
     Import(import::Arguments),
     Latency(latency::Arguments),
     Logo(logo::Arguments),
+    Machine(machine::Arguments),
     Man(man::Arguments),
     Mirror(mirror::Arguments),
     New(new::Arguments),
@@ -172,6 +174,7 @@ fn run(kinds: &'static Kinds) -> Outcome {
         Command::Import(arguments) => import::run(&arguments, kinds),
         Command::Latency(arguments) => latency::run(&arguments),
         Command::Logo(arguments) => logo::run(&arguments),
+        Command::Machine(arguments) => machine::run(&arguments, kinds),
         Command::Man(arguments) => man::run(&arguments),
         Command::Mirror(arguments) => mirror::run(&arguments, kinds),
         Command::New(arguments) => new::run(&arguments, kinds),

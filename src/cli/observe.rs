@@ -33,6 +33,7 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
         kinds,
         role: Role::Observer,
         program: Box::new(Idle),
+        bus: None,
         interval: arguments.tick,
     };
     host::run(job, &arguments.host)

@@ -81,6 +81,7 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
     let report = player.report().expect("a player has one");
     let job = Job {
         has_replies: false,
+        bus: None,
         title: TITLE,
         file: &arguments.file,
         kinds,

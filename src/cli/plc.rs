@@ -71,6 +71,7 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
         role: Role::Controller,
         program,
         has_replies: false,
+        bus: None,
         interval,
     };
     host::run(job, &arguments.host)

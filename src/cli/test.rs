@@ -18,9 +18,12 @@ use super::progress::Progress;
 use tickbus_base::toml_text::{Mistakes, load_text};
 use tickbus_driver::DriverError;
 use tickbus_driver_cfg::Kinds;
+use tickbus_driver_cfg::loopback::Peer;
+use tickbus_plc::ProgramError;
 use tickbus_report::{RunStatistics, Sweeps, Swept, link, page_beside, write_sweeps_file};
 use tickbus_testing::{
-    Case, Coverage, Group, Judgement, Suite, Test, Verdict, junit_xml, verdict_hash,
+    Case, Coverage, Group, Judgement, Suite, Test, Verdict, Wanted, build_program, junit_xml,
+    verdict_hash,
 };
 
 /// Run tests of PLC programs from TOML files, on simulation time.
@@ -49,6 +52,11 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "TEXT")]
     only: Option<String>,
 
+    /// Test this PLC program in the place of the one that the files name: a built-in one, a shared object, or Structured Text
+    /// (*.st), which iec2c and a C compiler build first.
+    #[arg(long, value_name = "PROGRAM")]
+    program: Option<String>,
+
     /// List the tests without running them.
     #[arg(long)]
     list: bool,
@@ -67,6 +75,53 @@ pub(super) struct Arguments {
 
     #[command(flatten)]
     format: Format,
+}
+
+/// Why a program of the command line cannot be tested.
+enum Unusable {
+    /// There is no such program.
+    Name(ProgramError),
+    /// Its source is wrong.
+    File(Mistakes),
+}
+
+impl Arguments {
+    /// The arguments that test `program` by the files in a folder.
+    pub(super) fn of_program(folder: PathBuf, program: &str, format: Format) -> Self {
+        Self {
+            paths: vec![folder],
+            junit: None,
+            keep: None,
+            page: None,
+            only: None,
+            program: Some(program.to_owned()),
+            list: false,
+            accept: false,
+            coverage: false,
+            jobs: None,
+            format,
+        }
+    }
+
+    /// What the tests are asked for, with the program, which is built if it is a text.
+    fn wanted(&self, kinds: &'static Kinds) -> Result<Wanted, Unusable> {
+        let program = self.program.as_deref().map(|name| {
+            let file = Path::new(name);
+            if !file
+                .extension()
+                .is_some_and(|ending| ending.eq_ignore_ascii_case("st"))
+            {
+                return Peer::named(name, kinds.programs()).map_err(Unusable::Name);
+            }
+            let object = build_program(file).map_err(Unusable::File)?;
+            let object = object.to_string_lossy();
+            Peer::named(&object, kinds.programs()).map_err(Unusable::Name)
+        });
+        Ok(Wanted {
+            counts: self.coverage,
+            program: program.transpose()?,
+        })
+    }
 }
 
 /// The longest name of a recording, in characters, and in bytes; file systems allow 255.
@@ -108,6 +163,7 @@ struct Details {
 struct Job<'a> {
     arguments: &'a Arguments,
     kinds: &'static Kinds,
+    wanted: Wanted,
     progress: Progress,
     /// The names of the recordings so far, in small letters: some file systems do not distinguish them.
     kept: Mutex<HashSet<String>>,
@@ -220,10 +276,19 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
         );
         return arguments.format.fail("test", &reason, Outcome::WrongInput);
     }
+    let wanted = match arguments.wanted(kinds) {
+        Ok(wanted) => wanted,
+        Err(Unusable::File(mistakes)) => return arguments.format.refuse("test", &mistakes),
+        Err(Unusable::Name(error)) => {
+            let reason = format!("test: --program: {error}");
+            return arguments.format.fail("test", &reason, Outcome::Usage);
+        }
+    };
     let mut count = Count::default();
     let job = Job {
         arguments,
         kinds,
+        wanted,
         progress: Progress::begin("test", "reading the tests"),
         kept: Mutex::default(),
     };
@@ -391,12 +456,7 @@ fn is_test_file(path: &Path) -> bool {
 fn run_file(file: &Path, job: &Job<'_>, count: &mut Count) -> (Group, Details) {
     let arguments = job.arguments;
     let name = file.display().to_string();
-    let load = if arguments.coverage {
-        Suite::load_counting
-    } else {
-        Suite::load
-    };
-    let suite = match load(file, job.kinds) {
+    let suite = match Suite::load_as(file, job.kinds, &job.wanted) {
         Ok(suite) => suite,
         Err(mistakes) => {
             count.wrong += mistakes.len();
@@ -481,9 +541,10 @@ fn run_test(suite: &Suite, test: &Test, job: &Job<'_>, count: &mut Count) -> Cas
                     count.failed += 1;
                     let (line, column) = failure.place;
                     let mut full = format!("{}:{line}:{column}: {}", suite.file, failure.what);
-                    for more in &failure.more {
+                    let hint = failure.hint.iter().map(|hint| format!("hint: {hint}"));
+                    for more in hint.chain(failure.more) {
                         full.push_str("\n      ");
-                        full.push_str(more);
+                        full.push_str(&more);
                     }
                     if let Some(folder) = &job.arguments.keep {
                         let names = (suite.file.as_str(), test.name.as_str());

@@ -7,7 +7,7 @@ use tickbus_base::toml_text::{Key, Shape, Table, Value, did_you_mean, names, sho
 use tickbus_fieldbus::loopback::{CYCLE, FreeLoopback, SteppedLoopback};
 use tickbus_fieldbus::{Bus, BusOptions, BusSetup, NamedFile, OpenError, Role};
 use tickbus_image::signal::SignalTable;
-use tickbus_plc::{HostedProgram, INTERVAL, Programs};
+use tickbus_plc::{HostedProgram, INTERVAL, ProgramError, Programs};
 use tickbus_record as record;
 
 use crate::kind_keys::KindKeys;
@@ -257,6 +257,23 @@ impl Peer {
         programs: &Programs,
     ) -> Option<Self> {
         read_program(program, options, scan, (Role::Device, programs))
+    }
+
+    /// Returns the program that a command line names: a built-in one, or the path of a user's own as seen from the current
+    /// folder.
+    ///
+    /// # Errors
+    ///
+    /// There is no such program, or the path cannot be made absolute.
+    pub fn named(name: &str, programs: &Programs) -> Result<Self, ProgramError> {
+        programs.check(name, &[])?;
+        let is_path = HostedProgram::is_path(name);
+        let peer = Self::Program {
+            name: name.to_owned(),
+            options: Vec::new(),
+            scan: (!is_path).then_some(INTERVAL),
+        };
+        Ok(peer.seen_from(Path::new("")))
     }
 
     /// Returns the same program for a text in `folder` instead of the folder of the driver.cfg: the path of a user's

@@ -8,6 +8,7 @@ use tickbus_image::signal::{SignalTable, Slot};
 
 use super::delay::Follows;
 use super::drive::Driven;
+use super::integrator::Integrator;
 use super::io::Io;
 use super::lag::Lag;
 use super::motor::Motor;
@@ -15,10 +16,17 @@ use super::numbers::{Counter, Encoder, Switch};
 use super::pulses::{Blink, LifeSign};
 use super::rule::Ruled;
 use super::signal::Output;
+use super::track::Track;
 use super::travel::Travel;
 
 /// The kind whose replies are rules.
 pub(crate) const RULE: &str = "rule";
+
+/// True for kinds whose replies may read what they make, because they read the values of the tick before: states that change
+/// with time.
+pub(crate) fn reads_tick_before(kind: &str) -> bool {
+    matches!(kind, RULE | "integrator" | "track")
+}
 
 /// One `[[reply]]` or `[[drive]]` of a driver.cfg, or `[[machine.reply]]` of a test file, at its beginning.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,6 +57,8 @@ pub(crate) enum Behaviour {
     Encoder(Box<Encoder>),
     Blink(Blink),
     LifeSign(LifeSign),
+    Integrator(Box<Integrator>),
+    Track(Box<Track>),
     Rule(Box<Ruled>),
     Drive(Box<Driven>),
 }
@@ -71,6 +81,8 @@ impl Behaviour {
             Self::Encoder(it) => it.step(io),
             Self::Blink(it) => it.step(io),
             Self::LifeSign(it) => it.step(io),
+            Self::Integrator(it) => it.step(io),
+            Self::Track(it) => it.step(io),
             Self::Rule(it) => it.step(io),
             Self::Drive(it) => it.step(io),
         }

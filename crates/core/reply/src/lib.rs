@@ -10,6 +10,7 @@ mod behaviour;
 mod condition;
 mod delay;
 mod drive;
+mod integrator;
 mod io;
 mod lag;
 mod levels;
@@ -23,6 +24,7 @@ mod rule;
 mod section;
 mod setting;
 mod signal;
+mod track;
 mod travel;
 
 pub use behaviour::Reply;

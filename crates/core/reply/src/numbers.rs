@@ -2,6 +2,7 @@
 
 use tickbus_base::Threshold;
 use tickbus_base::time::Nanos;
+use tickbus_image::signal::Slot;
 
 use super::io::Io;
 use super::levels::Levels;
@@ -71,7 +72,7 @@ pub(crate) struct Encoder {
     pub(crate) count: f64,
 }
 
-/// How fast an encoder counts, in counts per second.
+/// How fast an encoder counts, in counts per second, or a track runs.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Speed {
     Number {
@@ -85,23 +86,30 @@ pub(crate) enum Speed {
     },
 }
 
-impl Encoder {
-    pub(crate) fn step(&mut self, io: &mut Io<'_>) -> Nanos {
-        let rate = match &self.source {
-            Speed::Number { input, gain } => input.value(io.slots) * gain,
-            Speed::Conditions {
+impl Speed {
+    /// The speed, per second.
+    pub(crate) fn now(&self, slots: &[Slot]) -> f64 {
+        match self {
+            Self::Number { input, gain } => input.value(slots) * gain,
+            Self::Conditions {
                 forward,
                 reverse,
                 rate,
             } => {
-                let reverse = reverse.as_ref().is_some_and(|back| back.hold(io.slots));
-                match (forward.hold(io.slots), reverse) {
+                let reverse = reverse.as_ref().is_some_and(|back| back.hold(slots));
+                match (forward.hold(slots), reverse) {
                     (true, false) => *rate,
                     (false, true) => -rate,
                     _ => 0.0,
                 }
             }
-        };
+        }
+    }
+}
+
+impl Encoder {
+    pub(crate) fn step(&mut self, io: &mut Io<'_>) -> Nanos {
+        let rate = self.source.now(io.slots);
         let next = self.count + rate * io.seconds;
         if next.is_finite() {
             self.count = wrapped(next, self.limits);

@@ -3,7 +3,7 @@
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};
 
-use super::behaviour::{RULE, Reply};
+use super::behaviour::{Reply, reads_tick_before};
 
 /// The places of `replies` in an order in which each comes after those whose signals it reads, and else in that of the
 /// file; or the places along a circle of replies that read each other.
@@ -11,10 +11,9 @@ pub(crate) fn order(replies: &[&Reply]) -> Result<Vec<usize>, Vec<usize>> {
     let makers: HashMap<usize, usize> = (replies.iter().enumerate())
         .flat_map(|(place, reply)| reply.outputs.iter().map(move |signal| (*signal, place)))
         .collect();
-    // Rules are a machine of states, which may read what they set: they see the values of the tick before.
     let needs = |place: usize| {
         let inputs = replies[place].inputs.iter();
-        let inputs = inputs.filter(move |_| replies[place].kind != RULE);
+        let inputs = inputs.filter(move |_| !reads_tick_before(replies[place].kind));
         inputs.filter_map(|signal| makers.get(signal).copied())
     };
     let mut missing: Vec<usize> = (0..replies.len())

@@ -9,7 +9,7 @@ use tickbus_fieldbus::faults::{FaultBoard, Note};
 use tickbus_image::signal::{SignalTable, Slot};
 
 use super::awake::Awake;
-use super::behaviour::{Behaviour, RULE, Reply};
+use super::behaviour::{Behaviour, Reply, reads_tick_before};
 use super::io::{Io, Made, Writer, seconds};
 
 /// The replies of one machine. Its tick calls [`step`](Self::step) when the simulation has handed its values over, and
@@ -24,7 +24,7 @@ pub struct Replies {
     pub(crate) awake: Awake,
     /// By index of the signal.
     made: Box<[Made]>,
-    /// The signals of replies that rules read or make: they have them at the beginning of a tick, whatever a simulation
+    /// The signals of replies that rules, integrators and tracks read or make: they have them at the beginning of a tick, whatever a simulation
     /// that does not write them has handed over.
     kept: Box<[usize]>,
     board: Arc<FaultBoard>,
@@ -68,7 +68,7 @@ impl Replies {
             )));
             (time, notes.len() - 1)
         });
-        let rules = replies.iter().filter(|reply| reply.kind == RULE);
+        let rules = replies.iter().filter(|reply| reads_tick_before(reply.kind));
         let of_rules = rules.flat_map(|rule| rule.inputs.iter().chain(&rule.outputs).copied());
         let kept: BTreeSet<usize> = of_rules
             .filter(|signal| made[*signal].note != u32::MAX)

@@ -11,6 +11,7 @@ use tickbus_image::signal::{Area, DataType, Scale, Signal, SignalTable, Slot};
 use super::{Replies, Reply, Scope, read_sections};
 
 mod motors;
+mod states;
 
 /// The bits a to f and the numbers i, j, k and l of the machine; of the PLC the bits A to D, the number N, and the 64-bit
 /// integer L.

@@ -11,6 +11,16 @@ pub struct Failure {
     pub what: String,
     /// Further information, such as the last changes of the signal, one per line.
     pub more: Vec<String>,
+    /// What the program lacks, in the words of the test file: the `hint` of the step whose condition failed.
+    pub hint: Option<String>,
+}
+
+impl Failure {
+    /// The same with the hint of a step, unless it has one.
+    pub(super) fn hinted(mut self, hint: Option<&str>) -> Self {
+        self.hint = self.hint.or_else(|| hint.map(str::to_owned));
+        self
+    }
 }
 
 /// Why a run ends before its last step.
@@ -20,6 +30,16 @@ pub(super) enum Halt {
     Failed(Failure),
     /// The observer has seen enough.
     Over,
+}
+
+impl Halt {
+    /// The same with the hint of a step; see [`Failure::hinted`].
+    pub(super) fn hinted(self, hint: Option<&str>) -> Self {
+        match self {
+            Self::Failed(failure) => Self::Failed(failure.hinted(hint)),
+            Self::Over => Self::Over,
+        }
+    }
 }
 
 impl From<Failure> for Halt {

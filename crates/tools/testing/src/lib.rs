@@ -29,14 +29,14 @@ mod test;
 mod unswallowed;
 mod watch;
 
-pub use block::{Branch, Coverage};
+pub use block::{Branch, Coverage, build_program};
 pub use failure::Failure;
 pub use fit_file::{FitFile, Twin};
 pub use junit::{Case, Group, Verdict, junit_xml};
 pub use model::{Commands, Model};
 pub use run::Ran;
 pub use session::{Session, SessionRun};
-pub use suite::Suite;
+pub use suite::{Suite, Wanted};
 pub use sweep::{
     Accepted, Cell, CellMark, Judgement, Plan, Sweep, Tally, matrix, swept, swept_run, verdict_hash,
 };

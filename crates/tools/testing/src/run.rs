@@ -1,6 +1,7 @@
 //! Running one test.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use tickbus_base::time::{Manual, Nanos};
 use tickbus_driver::{Code, Driver, DriverError};
@@ -154,6 +155,8 @@ struct Standing {
     watched: Watched,
     never: bool,
     from: u64,
+    /// That of its step.
+    hint: Option<Arc<str>>,
 }
 
 /// The state of a running test.
@@ -214,6 +217,11 @@ impl Stand<'_> {
     }
 
     pub(super) fn run(&mut self, step: &Step) -> Result<(), Halt> {
+        let ran = self.run_step(step);
+        ran.map_err(|halt| halt.hinted(step.hint.as_deref()))
+    }
+
+    fn run_step(&mut self, step: &Step) -> Result<(), Halt> {
         let strict = self.is_strict();
         for (signal, value) in &step.set {
             self.slots[*signal] = *value;
@@ -247,6 +255,7 @@ impl Stand<'_> {
                     watched,
                     never,
                     from: self.ticks,
+                    hint: step.hint.clone(),
                 };
                 self.check_standing(&standing)?;
                 self.standing.push(standing);
@@ -390,6 +399,7 @@ impl Stand<'_> {
                 tape.name(),
             ),
             more: vec![self.watches[index].history(signal, self.step)],
+            hint: None,
         })
     }
 
@@ -398,6 +408,7 @@ impl Stand<'_> {
             place,
             what: format!("{}: {what}", moment(self.ticks, self.step)),
             more: Vec::new(),
+            hint: None,
         }
     }
 
@@ -450,6 +461,7 @@ impl Stand<'_> {
             watched,
             never,
             from,
+            hint,
         } = standing;
         // A required edge is awaited, since an edge cannot occur at every tick.
         if self.holds(watched) != *never {
@@ -461,7 +473,7 @@ impl Stand<'_> {
         } else {
             format!("{demand} at every tick since tick {from}")
         };
-        Err(self.failure(watched, &expected))
+        Err(self.failure(watched, &expected).hinted(hint.as_deref()))
     }
 
     /// Fails with the first of these expectations that was disappointed, and with all its signals.
@@ -479,6 +491,7 @@ impl Stand<'_> {
                 place: *place,
                 what: format!("{now}: expected nothing swallowed: {line}"),
                 more,
+                hint: None,
             });
         }
         Ok(())
@@ -496,6 +509,7 @@ impl Stand<'_> {
                 text_of(self.value(index), signal),
             ),
             more: vec![self.watches[index].history(signal, self.step)],
+            hint: None,
         }
     }
 }

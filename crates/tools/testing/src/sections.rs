@@ -1,6 +1,7 @@
 //! The sections of a test file: the machine, the tests, their steps.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Mistakes, Table, Value, shown};
@@ -28,6 +29,9 @@ const PRESS: Nanos = Nanos::from_millis(200);
 
 /// The longest name of a test, in characters.
 const NAME_LIMIT: usize = 200;
+
+/// The longest hint, in characters.
+const HINT_LIMIT: usize = 500;
 
 /// The facts that reading the other sections depends on.
 pub(super) struct Reader<'a> {
@@ -147,6 +151,7 @@ impl Reader<'_> {
         let place = table.collector().place(table.at());
         let name = table.require("name", "say in a sentence what is tested");
         let set = table.take("set");
+        let hint = table.take("hint").and_then(|value| hint_of(&value));
         let steps = table.require("steps", "write the steps, such as [{ tick = 1 }]");
         table.finish();
         let name = name.and_then(|value| {
@@ -155,7 +160,10 @@ impl Reader<'_> {
         });
         let initial = self.assignments(set.as_ref());
         let steps = steps.and_then(|value| {
-            let steps = self.steps(&value)?;
+            let mut steps = self.steps(&value)?;
+            for step in &mut steps {
+                step.hint = step.hint.take().or_else(|| hint.clone());
+            }
             let timed = steps.iter().rposition(Step::takes_time);
             let timed = timed.map_or(0, |last| last + 1);
             let watches = |step: &Step| {
@@ -213,7 +221,8 @@ impl Reader<'_> {
         let expect = table.take("expect");
         let during = table.take("during");
         let (always, never) = (table.take("always"), table.take("never"));
-        if table.all().next().is_none() {
+        let hint = table.take("hint").and_then(|value| hint_of(&value));
+        if table.all().all(|(key, _)| key == "hint") {
             table.wrong(
                 "a step without anything to do",
                 "write such as { run = \"1s\" }",
@@ -266,6 +275,7 @@ impl Reader<'_> {
         Some(vec![Step {
             place,
             row: None,
+            hint,
             set: set?,
             force: force?,
             release: release?,
@@ -441,6 +451,12 @@ impl Reader<'_> {
             }
         }
     }
+}
+
+/// What a program lacks that fails here.
+fn hint_of(value: &Value<'_>) -> Option<Arc<str>> {
+    let text = value.label(HINT_LIMIT, "say in a sentence what the program lacks");
+    text.map(Arc::from)
 }
 
 /// Names of faults: one, or a list of them.

@@ -36,6 +36,15 @@ pub struct Suite {
     pub(super) bench: Bench,
 }
 
+/// What a command line asks for beside the test files.
+#[derive(Clone, Debug, Default)]
+pub struct Wanted {
+    /// True if the branches of a block are counted in all runs.
+    pub counts: bool,
+    /// The PLC program to be tested, in the place of the one that a file names.
+    pub program: Option<Peer>,
+}
+
 /// The parts that all tests of a file share.
 #[derive(Clone, Debug)]
 pub(super) struct Bench {
@@ -56,22 +65,18 @@ impl Suite {
     ///
     /// With every mistake in the test file; if there are none, with those in its driver.cfg.
     pub fn load(path: &Path, kinds: &'static Kinds) -> Result<Self, Mistakes> {
-        Self::read(path, kinds, false)
+        Self::load_as(path, kinds, &Wanted::default())
     }
 
-    /// As [`load`](Self::load); if the file tests a block, its branches are counted in all runs.
+    /// As [`load`](Self::load), with what the command line asks for.
     ///
     /// # Errors
     ///
     /// As [`load`](Self::load).
-    pub fn load_counting(path: &Path, kinds: &'static Kinds) -> Result<Self, Mistakes> {
-        Self::read(path, kinds, true)
-    }
-
-    fn read(path: &Path, kinds: &'static Kinds, counts: bool) -> Result<Self, Mistakes> {
+    pub fn load_as(path: &Path, kinds: &'static Kinds, wanted: &Wanted) -> Result<Self, Mistakes> {
         let text = load_text(path)?;
         let folder = path.parent().unwrap_or_else(|| Path::new(""));
-        Self::parse(&path.display().to_string(), &text, (folder, kinds), counts)
+        Self::parse(&path.display().to_string(), &text, (folder, kinds), wanted)
     }
 
     /// The branches of the block that the runs so far have taken; `None` if nothing is counted.
@@ -87,12 +92,12 @@ impl Suite {
         file: &str,
         text: &str,
         (folder, kinds): (&Path, &'static Kinds),
-        counts: bool,
+        wanted: &Wanted,
     ) -> Result<Self, Mistakes> {
         let mut collector = Collector::new(file, text);
         let mut of_config = None;
         let read = read_text(&mut collector, text, |root| {
-            read(root, (folder, kinds), counts, &mut of_config)
+            read(root, (folder, kinds), wanted, &mut of_config)
         });
         match (collector.finish(), of_config) {
             (Some(mistakes), _) | (None, Some(mistakes)) => Err(mistakes),
@@ -113,7 +118,7 @@ impl Suite {
 fn read(
     mut root: Table<'_>,
     (folder, kinds): (&Path, &'static Kinds),
-    counts: bool,
+    wanted: &Wanted,
     of_config: &mut Option<Mistakes>,
 ) -> Option<(Bench, Vec<Test>, Option<Sweep>)> {
     let right = "write the path of the driver.cfg, as seen from this file";
@@ -146,11 +151,17 @@ fn read(
         }
     }
     root.finish();
+    if let (Some(value), Some(_)) = (block.block(), &wanted.program) {
+        value.wrong(
+            "a block has its own program, and the command line names another one",
+            "leave --program out for this file",
+        );
+    }
 
     let usual = block.block().map_or(STEP, |_| block::STEP);
     let step = step.map_or(Some(usual), |value| value.duration());
     if let (Some(value), Some(step)) = (block.block(), step) {
-        let ready = block.read((folder, kinds), step, counts, of_config)?;
+        let ready = block.read((folder, kinds), step, wanted.counts, of_config)?;
         let config = on_simulation_time(ready.config, value, folder, Some(ready.peer))?;
         let sections = (machine, tests, sweep);
         let (mut bench, tests, sweep) =
@@ -159,6 +170,7 @@ fn read(
         return Some((bench, tests, sweep));
     }
     let peer = match &program {
+        _ if wanted.program.is_some() => Some(wanted.program.clone()),
         None => Some(None),
         // The driver.cfg may be in a different folder from this file.
         Some(program) => {
@@ -303,7 +315,7 @@ fn on_simulation_time(
     }
     value.wrong(
         "this driver.cfg has no PLC program at the other end of its bus",
-        "name the one to be tested: program = \"…\"",
+        "name the one to be tested: program = \"…\", or --program on the command line",
     );
     None
 }

@@ -1,5 +1,7 @@
 //! Tests as read from a file, and their steps.
 
+use std::sync::Arc;
+
 use tickbus_fieldbus::faults::Fault;
 use tickbus_image::signal::Slot;
 use tickbus_reply::Condition;
@@ -22,6 +24,8 @@ pub struct Test {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Step {
     pub(super) place: TextPosition,
+    /// What the program lacks if the step fails, for people.
+    pub(super) hint: Option<Arc<str>>,
     /// The row of the table that this step is, from 1.
     pub(super) row: Option<usize>,
     pub(super) set: Vec<(usize, Slot)>,

@@ -5,6 +5,68 @@ use tickbus_base::toml_text::{Key, RequiredKey, Shape, TableKind, kind_names};
 use tickbus_image::signal::section::{NAME_LIMIT, TWO_NUMBERS};
 
 use crate::behaviour::RULE;
+use crate::section::reader::LIST_LIMIT;
+
+/// The flows of an integrator.
+const FLOWS: Shape = Shape::List(
+    &Shape::Table(&[
+        condition(
+            "when",
+            "The condition under which it flows; always without it",
+        ),
+        number("rate", "How fast, in units per second; negative: out"),
+        signal("input", "The signal whose number is how fast it flows"),
+        number("gain", "The factor of the input; negative: out").or("1"),
+    ]),
+    1,
+    LIST_LIMIT,
+);
+
+/// The sensors of a track.
+const SENSORS: Shape = Shape::List(
+    &Shape::Table(&[
+        Key::required(
+            "signal",
+            Shape::Text,
+            "The BOOL that is on while a part is there",
+        ),
+        Key::required("at", Shape::Number, "Where it is"),
+        number("above", "It sees only parts that are at least this high"),
+        number("below", "It sees only parts that are at most this high"),
+    ]),
+    1,
+    LIST_LIMIT,
+);
+
+/// The exits of a track.
+const EXITS: Shape = Shape::List(
+    &Shape::Table(&[
+        Key::required("at", Shape::Number, "Where a part leaves the track"),
+        condition(
+            "when",
+            "The condition under which it leaves; always without it",
+        ),
+        number("above", "Only parts that are at least this high leave"),
+        number("below", "Only parts that are at most this high leave"),
+        signal("signal", "The number of parts that have left here"),
+    ]),
+    1,
+    LIST_LIMIT,
+);
+
+/// The places of parts on a track.
+const PLACES: Shape = Shape::List(
+    &Shape::Table(&[
+        Key::required(
+            "position",
+            Shape::Text,
+            "The position of the front of a part; minus its length while there is none",
+        ),
+        signal("height", "The height of the part; 0 while there is none"),
+    ]),
+    1,
+    LIST_LIMIT,
+);
 
 const fn key(name: &'static str, shape: Shape, right: &'static str) -> RequiredKey {
     RequiredKey { name, shape, right }
@@ -23,7 +85,7 @@ const NUMBER_INPUT: RequiredKey = key(
 );
 
 /// The kinds of replies.
-pub const REPLY_KINDS: [TableKind; 12] = [
+pub const REPLY_KINDS: [TableKind; 14] = [
     TableKind::new(
         "constant",
         &[
@@ -168,6 +230,46 @@ pub const REPLY_KINDS: [TableKind; 12] = [
     ),
     TableKind::new("life-sign", &[SIGNAL], &["every", "input", "limits"]),
     TableKind::new(
+        "integrator",
+        &[
+            SIGNAL,
+            key(
+                "flows",
+                FLOWS,
+                "write what flows in and out, such as flows = [{ when = \"Pump on\", rate = 5 }]",
+            ),
+        ],
+        &["reset", "limits", "start"],
+    ),
+    TableKind::new(
+        "track",
+        &[
+            key(
+                "length",
+                Shape::Number,
+                "write how long the track is, such as length = 2000",
+            ),
+            key(
+                "size",
+                Shape::Number,
+                "write how long a part is, such as size = 100",
+            ),
+            key(
+                "parts",
+                Shape::List(&Shape::Number, 1, 1000),
+                "write the heights of the parts that come one after the other, such as parts = [40, 80, 40]",
+            ),
+            key(
+                "places",
+                PLACES,
+                "name a signal for the position of each part that can be on the track, such as places = [{ position = \"Part 1\" }]",
+            ),
+        ],
+        &[
+            "forward", "reverse", "rate", "input", "gain", "enters", "gap", "sensors", "exits",
+        ],
+    ),
+    TableKind::new(
         RULE,
         &[key(
             "when",
@@ -218,7 +320,7 @@ pub const REPLY_KEYS: &[Key] = &[
     ),
     signal(
         "input",
-        "lag, switch, encoder, life-sign: the signal with the number",
+        "lag, switch, encoder, track, life-sign: the signal with the number",
     ),
     condition("contactor", "motor: what switches it on"),
     signal("running", "motor: on while the contactor is on"),
@@ -255,7 +357,7 @@ pub const REPLY_KEYS: &[Key] = &[
     condition("trip", "motor: what trips the overload relay"),
     condition(
         "reset",
-        "motor: what resets the overload relay, which else resets itself; counter, encoder: what sets the count to start",
+        "motor: what resets the overload relay, which else resets itself; counter, encoder: what sets the count to start; integrator: what sets the number to start",
     ),
     condition("extend", "cylinder: the command out"),
     time("extend_time", "cylinder: the time for the whole way out"),
@@ -296,12 +398,13 @@ pub const REPLY_KEYS: &[Key] = &[
     Key::new(
         "limits",
         TWO_NUMBERS,
-        "cylinder, valve: the position in (closed) and out (open); lag: the least and the greatest value; counter, encoder, \
+        "cylinder, valve: the position in (closed) and out (open); lag, integrator: the least and the greatest value; counter, encoder, \
          life-sign: where the count wraps",
     ),
     number(
         "start",
-        "cylinder, valve: the first position; lag: the first value; counter, encoder: the first count",
+        "cylinder, valve: the first position; lag: the first value; counter, encoder: the first count; integrator: the first \
+         number",
     ),
     time(
         "time",
@@ -309,7 +412,7 @@ pub const REPLY_KEYS: &[Key] = &[
     ),
     number(
         "gain",
-        "lag: the factor of the input; encoder: counts per second for an input of 1",
+        "lag: the factor of the input; encoder, track: counts per second, or the speed, for an input of 1",
     )
     .or("1"),
     number("offset", "lag: what is added to the input").or("0"),
@@ -334,12 +437,35 @@ pub const REPLY_KEYS: &[Key] = &[
     )
     .or("0"),
     condition("down", "counter: what counts down"),
-    condition("forward", "encoder: what lets it count up"),
-    condition("reverse", "encoder: what lets it count down"),
-    number("rate", "encoder: the counts per second, above 0"),
+    condition("forward", "encoder, track: what lets it count up, or run"),
+    condition("reverse", "encoder, track: what lets it count down, or run back"),
+    number("rate", "encoder, track: the counts per second, or the speed; above 0"),
     time("on_for", "blink: how long it is on"),
     time("off_for", "blink: how long it is off; on_for by default"),
     time("every", "life-sign: the time between two counts"),
+    Key::new("flows", FLOWS, "integrator: what flows in and out"),
+    number("length", "track: how long it is"),
+    number("size", "track: how long a part is"),
+    number(
+        "gap",
+        "track: the least distance between the fronts of two parts that enter; twice the size by default",
+    ),
+    Key::new(
+        "parts",
+        Shape::List(&Shape::Number, 1, 1000),
+        "track: the heights of the parts that enter, one after the other, and again from the beginning",
+    ),
+    condition(
+        "enters",
+        "track: parts enter while this holds; always without it",
+    ),
+    Key::new("sensors", SENSORS, "track: what sees the parts"),
+    Key::new("exits", EXITS, "track: where parts leave it before its end"),
+    Key::new(
+        "places",
+        PLACES,
+        "track: the signals of each part that can be on it at a time",
+    ),
     time(
         "after",
         "rule: how long the conditions hold before it takes effect; at once without it",

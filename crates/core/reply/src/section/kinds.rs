@@ -2,6 +2,7 @@
 
 use tickbus_base::Threshold;
 use tickbus_base::time::Nanos;
+use tickbus_base::toml_text::short_number;
 use tickbus_fieldbus::faults::Random;
 use tickbus_image::signal::DataType;
 use tickbus_image::signal::section::{slot_of, value_limits};
@@ -9,12 +10,14 @@ use tickbus_image::signal::section::{slot_of, value_limits};
 use super::reader::Reader;
 use crate::behaviour::{Behaviour, RULE};
 use crate::delay::{Delay, Follows};
+use crate::integrator::{Flow, Integrator};
 use crate::lag::{Lag, Source};
 use crate::motor::Motor;
 use crate::numbers::{Counter, Encoder, Speed, Switch};
 use crate::part::{Part, Rates};
 use crate::pulses::{Beat, Blink, LifeSign};
 use crate::signal::Output;
+use crate::track::{Exit, Lane, Sensor, Span, Track};
 use crate::travel::{Drive, Travel};
 
 /// The positions of a part without `limits`, in percent.
@@ -56,6 +59,10 @@ pub fn one_of(kind: &str) -> &'static [OneOf] {
             &["input", "forward"],
             "name the signal with the speed, such as input = \"Belt speed\", or a condition with \"forward\"",
         )],
+        "track" => &[(
+            &["input", "forward"],
+            "write what moves it, such as forward = \"Belt on\" with a rate, or the signal with its speed with \"input\"",
+        )],
         "life-sign" => &[(
             &["every", "input"],
             "write how often it counts, such as every = \"1s\", or the signal that it repeats with \"input\"",
@@ -79,6 +86,8 @@ pub(super) fn read(kind: &str, reader: &Reader<'_>) -> Option<Behaviour> {
         "encoder" => encoder(reader),
         "blink" => blink(reader),
         "life-sign" => life_sign(reader),
+        "integrator" => integrator(reader),
+        "track" => track(reader),
         _ => reader.rule().map(|rule| Behaviour::Rule(Box::new(rule))),
     }
 }
@@ -292,9 +301,26 @@ fn counter(reader: &Reader<'_>) -> Option<Behaviour> {
 }
 
 fn encoder(reader: &Reader<'_>) -> Option<Behaviour> {
-    let signal = reader.number_made("signal");
+    let (signal, source) = (reader.number_made("signal"), speed(reader));
+    let reset = reader.levels("reset");
+    let signal = signal??;
+    let limits = reader.count_limits(signal.signal())?;
+    let start = reader.start(limits)?;
+    let start = start.unwrap_or_else(|| first_count(limits));
+    Some(Behaviour::Encoder(Box::new(Encoder {
+        signal,
+        source: source?,
+        reset: reset?,
+        limits,
+        start,
+        count: start,
+    })))
+}
+
+/// A speed: a number, or conditions with a rate.
+fn speed(reader: &Reader<'_>) -> Option<Speed> {
     let input = reader.input("input", false);
-    let [forward, reverse, reset] = ["forward", "reverse", "reset"].map(|key| reader.levels(key));
+    let [forward, reverse] = ["forward", "reverse"].map(|key| reader.levels(key));
     let [gain, rate] = ["gain", "rate"].map(|key| reader.number(key));
     let sound = [
         reader.exclude("input", "forward"),
@@ -303,11 +329,8 @@ fn encoder(reader: &Reader<'_>) -> Option<Behaviour> {
         reader.needs("reverse", "forward"),
         reader.needs("forward", "rate"),
     ];
-    let signal = signal??;
-    let limits = reader.count_limits(signal.signal())?;
-    let start = reader.start(limits)?;
     sound.into_iter().collect::<Option<()>>()?;
-    let source = match input? {
+    Some(match input? {
         Some(input) => Speed::Number {
             input,
             gain: gain?.unwrap_or(1.0),
@@ -317,15 +340,120 @@ fn encoder(reader: &Reader<'_>) -> Option<Behaviour> {
             reverse: reverse?,
             rate: rate??,
         },
-    };
+    })
+}
+
+fn integrator(reader: &Reader<'_>) -> Option<Behaviour> {
+    let (signal, reset) = (reader.number_made("signal"), reader.levels("reset"));
+    let flows = reader.each("flows", &["when", "rate", "input", "gain"], |flow| {
+        let (when, input) = (flow.levels("when"), flow.input("input", false));
+        let [rate, gain] = ["rate", "gain"].map(|key| flow.number(key));
+        let sound = [
+            flow.exclude("input", "rate"),
+            flow.needs("gain", "input"),
+            flow.needs_one_of(
+                &["rate", "input"],
+                "add how fast it flows, such as rate = 5",
+            ),
+        ];
+        sound.into_iter().collect::<Option<()>>()?;
+        let (input, rate) = (input?, rate?);
+        Some(Flow {
+            when: when?,
+            factor: rate.or(gain?).unwrap_or(1.0),
+            input,
+        })
+    });
+    let signal = signal??;
+    let (least, greatest) = value_limits(reader.signal(signal.signal()));
+    let usual = reader.signal(signal.signal()).range;
+    let usual = usual.map_or([least, greatest], |[one, other]| {
+        [one.min(other), one.max(other)]
+    });
+    let limits = reader.limits(Some(signal.signal()), usual)?;
+    let start = reader.start(limits)?;
     let start = start.unwrap_or_else(|| first_count(limits));
-    Some(Behaviour::Encoder(Box::new(Encoder {
+    Some(Behaviour::Integrator(Box::new(Integrator {
         signal,
-        source,
+        flows: flows??.into(),
         reset: reset?,
         limits,
         start,
-        count: start,
+        at: start,
+    })))
+}
+
+/// The heights that a sensor or an exit of a track is for.
+fn span(reader: &Reader<'_>) -> Option<Span> {
+    let [above, below] = ["above", "below"].map(|key| reader.number(key));
+    Some(Span {
+        above: above?.unwrap_or(f64::NEG_INFINITY),
+        below: below?.unwrap_or(f64::INFINITY),
+    })
+}
+
+fn track(reader: &Reader<'_>) -> Option<Behaviour> {
+    let (speed, enters) = (speed(reader), reader.levels("enters"));
+    let [length, size, gap] = ["length", "size", "gap"].map(|key| reader.above_zero(key));
+    let parts = reader.numbers("parts");
+    let sensors = reader.each("sensors", &["signal", "at", "above", "below"], |sensor| {
+        let (signal, at, span) = (sensor.bit("signal"), sensor.number("at"), span(sensor));
+        let whole = [sensor.require("signal"), sensor.require("at")];
+        whole.into_iter().collect::<Option<()>>()?;
+        Some(Sensor {
+            signal: signal??,
+            at: at??,
+            span: span?,
+        })
+    });
+    let exits = reader.each(
+        "exits",
+        &["at", "when", "above", "below", "signal"],
+        |exit| {
+            let (at, when, span) = (exit.number("at"), exit.levels("when"), span(exit));
+            let signal = exit.number_made("signal");
+            exit.require("at")?;
+            Some(Exit {
+                at: at??,
+                when: when?,
+                span: span?,
+                signal: signal?,
+                count: 0.0,
+            })
+        },
+    );
+    let places = reader.each("places", &["position", "height"], |place| {
+        let [position, height] = ["position", "height"].map(|key| place.number_made(key));
+        place.require("position")?;
+        Some(Lane {
+            position: position??,
+            height: height?,
+            part: None,
+        })
+    });
+    let (length, size, gap) = (length??, size??, gap?.unwrap_or(2.0 * size??));
+    if gap < size {
+        return reader.wrong(
+            "gap",
+            format!(
+                "parts of {} enter every {}",
+                short_number(size),
+                short_number(gap)
+            ),
+            "write a gap that is not shorter than a part",
+        );
+    }
+    Some(Behaviour::Track(Box::new(Track {
+        speed: speed?,
+        enters: enters?,
+        length,
+        size,
+        gap,
+        parts: parts?.into(),
+        entered: 0,
+        sensors: sensors?.unwrap_or_default().into(),
+        exits: exits?.unwrap_or_default().into(),
+        lanes: places??.into(),
     })))
 }
 

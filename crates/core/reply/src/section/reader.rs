@@ -7,7 +7,7 @@
 use std::cell::{Cell, RefCell};
 
 use tickbus_base::time::Nanos;
-use tickbus_base::toml_text::{Value, short_number, shown};
+use tickbus_base::toml_text::{Table, Value, short_number, shown};
 use tickbus_fieldbus::faults::unknown;
 use tickbus_image::signal::section::{pair_of, value_limits};
 use tickbus_image::signal::{DataType, Signal};
@@ -23,6 +23,9 @@ use crate::signal::{Form, Input, Output};
 /// The advice where the name of a signal is expected.
 const NAME: &str = "write the name of a signal in quotes";
 
+/// The greatest number of tables in a list of a reply.
+pub(super) const LIST_LIMIT: usize = 64;
+
 /// The greatest count: doubles have all whole numbers up to it.
 const MOST: f64 = 9_007_199_254_740_991.0;
 
@@ -30,6 +33,8 @@ const MOST: f64 = 9_007_199_254_740_991.0;
 /// key that is not there.
 pub(super) struct Reader<'a> {
     values: Vec<(&'static str, Value<'a>)>,
+    /// The list in which the section is a table, if it is one.
+    at: Option<Value<'a>>,
     scope: Scope<'a>,
     inputs: RefCell<Vec<usize>>,
     outputs: RefCell<Vec<(usize, Value<'a>)>>,
@@ -43,6 +48,7 @@ impl<'a> Reader<'a> {
     pub(super) fn new(values: Vec<(&'static str, Value<'a>)>, scope: Scope<'a>) -> Self {
         Self {
             values,
+            at: None,
             scope,
             inputs: RefCell::default(),
             outputs: RefCell::default(),
@@ -263,6 +269,88 @@ impl<'a> Reader<'a> {
         Some(amount)
     }
 
+    /// A number above 0.
+    pub(super) fn above_zero(&self, key: &str) -> Option<Option<f64>> {
+        let number = self.number(key)?;
+        if number.is_some_and(|number| number <= 0.0) {
+            let written = self.get(key).map(Value::written).unwrap_or_default();
+            return self.wrong(key, format!("\"{key}\" is {written}"), "write more than 0");
+        }
+        Some(number)
+    }
+
+    /// A list of numbers, at least one.
+    pub(super) fn numbers(&self, key: &str) -> Option<Vec<f64>> {
+        const RIGHT: &str = "write a list of numbers, such as [40, 80]";
+        let value = self.get(key)?;
+        let list = value.list(RIGHT)?;
+        if list.is_empty() {
+            value.wrong("an empty list has no number", RIGHT);
+            return None;
+        }
+        let numbers: Vec<_> = list.iter().map(|value| value.number(RIGHT)).collect();
+        numbers.into_iter().collect()
+    }
+
+    /// Reads each table of a list, which has these keys.
+    pub(super) fn each<T>(
+        &self,
+        key: &str,
+        keys: &[&'static str],
+        read: impl Fn(&Self) -> Option<T>,
+    ) -> Option<Option<Vec<T>>> {
+        let Some(value) = self.get(key) else {
+            return Some(None);
+        };
+        let tables = value.tables(key);
+        if tables.is_empty() || tables.len() > LIST_LIMIT {
+            value.wrong(
+                format!("\"{key}\" has {} tables", tables.len()),
+                format!("write 1 to {LIST_LIMIT} tables, such as {key} = [{{ … }}]"),
+            );
+            return None;
+        }
+        let one = |mut table: Table<'a>| {
+            let values = keys
+                .iter()
+                .filter_map(|key| Some((*key, table.take(key)?)))
+                .collect();
+            let at = value.clone();
+            table.finish();
+            let inner = Self {
+                at: Some(at),
+                ..Self::new(values, self.scope)
+            };
+            let made = read(&inner);
+            let (inputs, outputs, _) = inner.finish();
+            self.inputs.borrow_mut().extend(inputs);
+            self.outputs.borrow_mut().extend(outputs);
+            made
+        };
+        let read: Vec<_> = tables.into_iter().map(one).collect();
+        read.into_iter().collect::<Option<_>>().map(Some)
+    }
+
+    /// Reports that a table of a list has no `key`.
+    pub(super) fn require(&self, key: &str) -> Option<()> {
+        self.needs_one_of(&[key], &format!("add \"{key}\" to each table"))
+    }
+
+    /// Reports that a table of a list has none of these keys.
+    pub(super) fn needs_one_of(&self, keys: &[&str], right: &str) -> Option<()> {
+        if keys.iter().any(|key| self.get(key).is_some()) {
+            return Some(());
+        }
+        let place = self.values.first().map(|(_, value)| value);
+        if let Some(value) = place.or(self.at.as_ref()) {
+            value.wrong(
+                format!("this table has no \"{}\"", keys.join("\" and no \"")),
+                right,
+            );
+        }
+        None
+    }
+
     /// The key `limits`, within what `signal` can have; `usual` without it.
     pub(super) fn limits(&self, signal: Option<usize>, usual: [f64; 2]) -> Option<[f64; 2]> {
         let stated = self.read("limits", |value| {
@@ -350,7 +438,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Reports a mistake in a value.
-    fn wrong<T>(&self, key: &str, what: String, right: impl Into<String>) -> Option<T> {
+    pub(super) fn wrong<T>(&self, key: &str, what: String, right: impl Into<String>) -> Option<T> {
         if let Some(value) = self.get(key) {
             value.wrong(what, right);
         }

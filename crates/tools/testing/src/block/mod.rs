@@ -8,7 +8,7 @@ mod coverage;
 
 use std::fmt::Write as _;
 use std::io::ErrorKind;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use build::{Unbuilt, built};
@@ -17,7 +17,7 @@ pub use coverage::{Branch, Coverage};
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{
-    Mistakes, PlacedMistake, Table, Value, did_you_mean, printable, shown,
+    Mistakes, PlacedMistake, Table, Value, did_you_mean, load_text, printable, shown,
 };
 use tickbus_driver_cfg::loopback::Peer;
 use tickbus_driver_cfg::{Config, Kinds};
@@ -47,6 +47,42 @@ pub(super) struct Ready {
     pub(super) initial: Vec<(usize, Slot)>,
     /// The branches, if they are counted.
     pub(super) counted: Option<Arc<Counted>>,
+}
+
+/// Builds the whole program in a file of Structured Text, by `plc/build` (which needs `iec2c` and a C compiler), unless it
+/// was built before. Returns the shared object.
+///
+/// # Errors
+///
+/// The file cannot be read, has mistakes that the compiler finds, or cannot be built.
+pub fn build_program(path: &Path) -> Result<PathBuf, Mistakes> {
+    let text = load_text(path)?;
+    let file = path.display().to_string();
+    built("program", &text).map_err(|unbuilt| match unbuilt {
+        Unbuilt::Reason(reason) => {
+            let (what, right) = remedy(&reason);
+            Mistakes::of_file(&file, printable(what), right)
+        }
+        Unbuilt::Mistakes(found) => Mistakes::of_list(
+            &file,
+            found
+                .into_iter()
+                .map(|(line, column, words)| PlacedMistake {
+                    place: Some((line, column)),
+                    mistake: Mistake::new(
+                        printable(&words),
+                        "docs/own-plc-program.md tells what is compiled",
+                    ),
+                })
+                .collect(),
+        ),
+    })
+}
+
+/// Why something was not built, and what to do about it.
+fn remedy(reason: &str) -> (&str, &str) {
+    let parts = reason.split_once("; ");
+    parts.unwrap_or((reason, "docs/own-plc-program.md says what it needs"))
 }
 
 impl<'a> BlockKeys<'a> {
@@ -148,9 +184,7 @@ impl<'a> BlockKeys<'a> {
         let object = match object {
             Ok(object) => object,
             Err(Unbuilt::Reason(reason)) => {
-                let (what, right) = reason
-                    .split_once("; ")
-                    .unwrap_or((&reason, "docs/own-plc-program.md says what it needs"));
+                let (what, right) = remedy(&reason);
                 named.wrong(printable(what), right);
                 return None;
             }

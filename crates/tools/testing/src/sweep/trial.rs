@@ -114,6 +114,7 @@ impl Trial {
             place: self.plan.sweep.place,
             what,
             more: Vec::new(),
+            hint: None,
         }))
     }
 

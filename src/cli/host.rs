@@ -181,10 +181,15 @@ fn configure(job: &Job<'_>, arguments: &Hosting) -> Result<Config, Outcome> {
     Ok(config)
 }
 
+/// Keys that a kind of bus needs, with the value for a machine of which nobody need be kept away.
+const NEEDED: &[(&str, &str)] = &[("opcua-server", "anonymous = true\n")];
+
 /// Returns the same driver on a bus of this kind with its defaults, and with its own page.
 fn on_bus(mut config: Config, kind: &str) -> Result<Config, Mistakes> {
     let page = config.page.take();
-    let text = format!("[fieldbus]\nkind = {}\n", json!(kind));
+    let needed = NEEDED.iter().find(|(known, _)| *known == kind);
+    let needed = needed.map_or("", |(_, keys)| keys);
+    let text = format!("[fieldbus]\nkind = {}\n{needed}", json!(kind));
     let mut config = config.overlaid("--bus", &text)?;
     config.page = page;
     Ok(config)

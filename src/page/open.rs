@@ -70,7 +70,7 @@ pub(crate) fn show(
         return Ok(None);
     };
     let options = options(config)?;
-    let any = "listen = \"127.0.0.1:0\" in [page]";
+    let any = "listen = \"127.0.0.1:0\" in [page], or --page 127.0.0.1:0,";
     let token = wanted.token_file.as_ref();
     let token = token.map(|file| config.folder().join(file));
     let open = open(

@@ -22,6 +22,7 @@ mod iec2c;
 mod java;
 #[cfg(target_os = "linux")]
 mod libmodbus;
+mod machines;
 mod modbus;
 mod modbus_functions;
 mod modbus_lines;
@@ -59,6 +60,7 @@ fn main() -> ExitCode {
         ("prepare", prepare::TESTS),
         ("iec2c", iec2c::TESTS),
         ("block", block::TESTS),
+        ("machines", machines::TESTS),
         ("s7", s7::TESTS),
         #[cfg(feature = "opcua")]
         ("opcua", opcua::TESTS),

@@ -23,6 +23,7 @@ mod import;
 mod installed;
 mod logo;
 mod loopback;
+mod machines;
 mod new;
 mod observer;
 mod own_program;

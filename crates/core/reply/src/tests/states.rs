@@ -108,7 +108,7 @@ fn wrong_integrators_and_tracks_are_refused_at_their_place() {
         ),
         (
             format!("{integrator}flows = [{{ rate = 1, input = \"N\" }}]"),
-            "x:4:20: \"rate\" stands beside \"input\"; remove one of them",
+            "x:4:19: \"rate\" stands beside \"input\"; remove one of them",
         ),
         (
             format!("{integrator}flows = [{{ rate = 1, wenn = \"A\" }}]"),

@@ -236,7 +236,7 @@ fn variable(name: &str, language: Language, taken: &mut BTreeSet<String>) -> Str
             let (first, rest) = word.split_at(1);
             first.to_ascii_uppercase() + rest
         });
-        words.first().cloned().unwrap_or_default() + &rest.collect::<String>()
+        words.first().cloned().unwrap_or_default() + rest.collect::<String>().as_str()
     } else {
         words.join("_")
     };

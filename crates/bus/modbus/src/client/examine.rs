@@ -12,7 +12,7 @@ use super::{ClientOptions, Region, Request};
 use crate::tls::{self, ClientSide};
 use crate::{ElementAddress, Exception, Line, Piece, Span, Table};
 
-pub(super) use ask::{Frame, Miss, Talk};
+pub(super) use ask::{Frame, Miss, Talk, legible};
 use speak::{Reached, answers};
 
 /// The units that devices usually have, to be tried if the one of the file does not answer.

@@ -2,7 +2,7 @@
 
 use tickbus_fieldbus::examine::{Found, Search, Searching};
 
-use super::examine::{Frame, Miss, Talk, USUAL_UNITS};
+use super::examine::{Frame, Miss, Talk, USUAL_UNITS, legible};
 use super::{Region, Request};
 use crate::{Identification, Span, Table};
 
@@ -69,12 +69,8 @@ fn identify(talk: &mut Talk, unit: u8) -> Result<Identification, Miss> {
 fn describe(address: &str, unit: u8, identification: &Identification) -> Found {
     let mut identity = identification.line();
     if identity.is_empty() {
-        identity.clone_from(
-            identification
-                .server_id
-                .as_ref()
-                .unwrap_or(&identity.clone()),
-        );
+        let id = identification.server_id.as_deref();
+        identity = id.map(legible).unwrap_or_default();
     }
     Found {
         identity,

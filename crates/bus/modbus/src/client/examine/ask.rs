@@ -148,7 +148,7 @@ impl Talk {
                 let data = expect(Function::ReportServerId, &answer).map_err(miss)?;
                 let text = data.get(1..).unwrap_or_default();
                 Ok(Identification {
-                    server_id: Some(legible(text)),
+                    server_id: Some(text.to_vec()),
                     ..Identification::default()
                 })
             }
@@ -187,7 +187,7 @@ fn miss(error: AnswerError) -> Miss {
 }
 
 /// The printable parts of a server id, whose format is the device's own.
-fn legible(bytes: &[u8]) -> String {
+pub(in crate::client) fn legible(bytes: &[u8]) -> String {
     let texts = bytes.split(|byte| !matches!(byte, b' '..=b'~'));
     let texts = texts.map(|text| String::from_utf8_lossy(text).trim().to_owned());
     let texts: Vec<String> = texts.filter(|text| text.len() > 1).collect();

@@ -34,7 +34,7 @@ pub const NO_SETPOINTS: u16 = 1910;
 /// The actual speed counts as the setpoint, and as standstill, within this part of the reference speed.
 const TOLERANCE: f64 = 0.01;
 
-/// What a drive is.
+/// The properties of a drive.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setup {
     /// The telegram.
@@ -57,7 +57,7 @@ pub struct Setup {
     pub mechanics: Mechanics,
 }
 
-/// What the machine says of the drive in a step.
+/// The state of the machine in a step, as far as it concerns the drive.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Measured {
     /// The actual speed, if a simulation has it.

@@ -289,7 +289,7 @@ pub fn read<'a>(
 
 /// The data shared by the sections of all signals of one axis or drive.
 struct Structures<'t, 'a> {
-    /// What the table describes, in messages.
+    /// The kind of thing that the table describes, in messages.
     kind: &'static str,
     name: &'t Value<'a>,
     /// The values of `command_offset` and `feedback_offset`.

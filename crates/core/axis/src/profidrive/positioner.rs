@@ -47,7 +47,7 @@ const FOLLOWING_ERROR: f64 = 1000.0;
 /// The least override of acceleration and deceleration, which is not 0 either in SINAMICS.
 const LEAST_RATE: f64 = 0.0001;
 
-/// What the axis can do. Its lengths are in LU.
+/// The limits of an axis, in LU.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mechanics {
     /// The greatest velocity, in LU/s.
@@ -94,7 +94,7 @@ pub(super) struct Positioner {
     place: Place,
     mode: Mode,
     task: Option<Task>,
-    /// What the PLC wrote when the task was taken over.
+    /// The words of the PLC when the task was taken over.
     taken: Option<(Task, u16)>,
     is_acknowledged: bool,
     is_there: bool,

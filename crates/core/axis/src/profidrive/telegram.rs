@@ -6,7 +6,7 @@ use tickbus_image::signal::{Area, DataType, Scale};
 pub(crate) const WHOLE: f64 = 16_384.0;
 const WHOLE_LONG: f64 = 1_073_741_824.0;
 
-/// What a word, or a double word, of a telegram has, by its name in the profile and in SINAMICS.
+/// A word or double word of a telegram, by its name in the profile and in SINAMICS.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[expect(missing_docs, reason = "the profile's own names")]
 pub enum Word {

@@ -154,7 +154,7 @@ const OF_ENCODER: &str = "increments";
 pub struct Read<'a> {
     /// The name.
     pub name: String,
-    /// What the drive is.
+    /// The properties of the drive.
     pub setup: Setup,
     /// The conditions of a fault and of a warning, which are read when all signals are known.
     pub conditions: [Option<Value<'a>>; 2],

@@ -142,7 +142,7 @@ pub struct Section<'a> {
 /// A structure in the image that one table of the driver.cfg describes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Structure {
-    /// What the table describes: `axis` or `drive`.
+    /// The kind of thing that the table describes: `axis` or `drive`.
     pub kind: &'static str,
     /// Index of the table among all of these, from 0.
     pub table: usize,

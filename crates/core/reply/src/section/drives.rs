@@ -26,7 +26,7 @@ const fn kind(telegram: Telegram) -> &'static str {
 pub struct Drive<'a> {
     /// The name.
     pub name: String,
-    /// What the drive is.
+    /// The properties of the drive.
     pub setup: Setup,
     /// The conditions of a fault and of a warning.
     pub conditions: [Option<Value<'a>>; 2],

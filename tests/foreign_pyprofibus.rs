@@ -345,7 +345,7 @@ fn drives() -> Result<(), Absent> {
          [[signal]]\nname = \"hot\"\naddress = \"%IX4.0\"\n\
          [fieldbus.at]\nhot = \"slot 0 record 100 %IX0.0\"\n\
          [[drive]]\nname = \"Spindle\"\ntelegram = 1\nreference_speed = 1500\nfault = \"hot\"\nwarning = \"hot\"\n\
-         ramp_up = \"1s\"\nramp_down = \"1s\"\nquick_stop = \"200ms\"\ncoast = \"300ms\"\n"
+         ramp_up = \"1s\"\nramp_down = \"3s\"\nquick_stop = \"200ms\"\ncoast = \"300ms\"\n"
     );
     write_gsd(folder.path(), &text, own);
     let mut machine = Machine::open(&text);

@@ -53,9 +53,9 @@ def main():
     drive.write(0x047F, HALF, 0x027F, 0x0270)  # ON from the beginning is no way out of S1
     drive.write(0x047E, HALF, 0x027F, 0x0231)
     drive.write(0x047F, HALF, 0x027F, 0x0237)
-    within("the ramp up", drive.write(0x047F, HALF, 0x0107, 0x0107, HALF), 0.1, 5)
-    within("the next ramp", drive.write(0x047F, WHOLE, 0x0507, 0x0507, WHOLE), 0.45, 5)
-    within("OFF1", drive.write(0x047E, WHOLE, 0x007F, 0x0031, 0), 0.95, 6)
+    within("the ramp up", drive.write(0x047F, HALF, 0x0107, 0x0107, HALF), 0.1, LIMIT)
+    within("the next ramp", drive.write(0x047F, WHOLE, 0x0507, 0x0507, WHOLE), 0.45, LIMIT)
+    within("OFF1", drive.write(0x047E, WHOLE, 0x007F, 0x0031, 0), 2.85, LIMIT)
     drive.write(0x047F, -HALF, 0x0107, 0x0107, -HALF)
     # A fault, which is acknowledged by an edge once its cause is gone.
     drive.write(0x047F, QUARTER, 0x004F, 0x0048)
@@ -65,7 +65,7 @@ def main():
     drive.write(0x047E, WHOLE, 0x004F, 0x0001)
     drive.write(0x047F, WHOLE, 0x0107, 0x0107, WHOLE)
     # A quick stop, then switching on inhibited.
-    within("OFF3", drive.write(0x047B, WHOLE, 0x007F, 0x0050, 0), 0.15, 0.9)
+    within("OFF3", drive.write(0x047B, WHOLE, 0x007F, 0x0050, 0), 0.15, 2.5)
     drive.write(0x047F, WHOLE, 0x007F, 0x0070)
     ms1, server = DpTelegram.SSAP_MS1, DpTelegram.DSAP_SERVER
     addresses = ["100007d00000", "100004600000", "100208020000", "100208050000"]

@@ -6,6 +6,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
+#[cfg(target_os = "linux")]
+use super::doctor::peers::filtered_at;
 use super::doctor::peers::{Cpu, Registers, server_at};
 
 fn find(arguments: &[String]) -> Output {
@@ -32,8 +34,8 @@ fn twenty_servers_in_a_network_are_found_within_five_seconds_and_silent_addresse
         // Every second one has a unit of its own, as behind a gateway.
         let unit = (last % 2 == 0).then_some(255);
         Registers {
-            words,
             unit,
+            words,
             ..Registers::default()
         }
         .serve_at(&at(last));
@@ -87,6 +89,24 @@ fn twenty_servers_in_a_network_are_found_within_five_seconds_and_silent_addresse
     // Of an address without any answer each attempt is one packet. One that accepts gets a few connections more.
     assert!(connections.load(Ordering::SeqCst) <= 5, "{connections:?}");
     assert!(bytes.load(Ordering::SeqCst) <= 200, "{bytes:?}");
+}
+
+/// 254 addresses at three ports, none of which answers: each attempt is one packet, as systems repeat it after a second.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_network_in_which_nobody_answers_takes_less_than_five_seconds_and_one_packet_per_port() {
+    let ports = [(); 3].map(|()| filtered_at("0.0.0.0:0").port());
+    let ranges = ports.map(|port| format!("127.20.9.1-254:{port}"));
+    let begin = Instant::now();
+    let output = find(&ranges);
+    let took = begin.elapsed();
+    let told = String::from_utf8_lossy(&output.stdout);
+    assert!(
+        told.contains("devices=0 tried=762 refused=0 silent=762"),
+        "{told}"
+    );
+    assert!(took < Duration::from_secs(5), "{took:?}");
+    assert_eq!(output.status.code(), Some(3));
 }
 
 fn at_of(last: u8, port: &str) -> String {

@@ -42,18 +42,24 @@ pub(crate) fn closed() -> SocketAddr {
 
 /// A port that drops packets: its queue of connections is full, and nobody accepts them.
 pub(crate) fn filtered() -> SocketAddr {
+    filtered_at("127.0.0.1:0")
+}
+
+/// As `filtered`, at this address.
+pub(crate) fn filtered_at(own: &str) -> SocketAddr {
     use socket2::{Domain, Socket, Type};
     let socket = Socket::new(Domain::IPV4, Type::STREAM, None).expect("a socket");
-    let any: SocketAddr = "127.0.0.1:0".parse().expect("an address");
-    socket.bind(&any.into()).expect("a port");
+    let own: SocketAddr = own.parse().expect("an address");
+    socket.bind(&own.into()).expect("a port");
     socket.listen(0).expect("a listener");
     let address = socket
         .local_addr()
         .expect("an address")
         .as_socket()
         .expect("of IPv4");
+    let reached = SocketAddr::from(([127, 0, 0, 1], address.port()));
     loop {
-        match TcpStream::connect_timeout(&address, Duration::from_millis(300)) {
+        match TcpStream::connect_timeout(&reached, Duration::from_millis(300)) {
             Ok(stream) => std::mem::forget(stream),
             Err(error) if error.kind() == ErrorKind::TimedOut => break,
             Err(error) => panic!("{error}"),
@@ -136,12 +142,17 @@ impl Registers {
         loop {
             let count = stream.read(&mut bytes).ok().filter(|count| *count > 0)?;
             inbox.extend_from_slice(&bytes[..count]);
-            while let Some((taken, transaction, unit, pdu)) = self.request(&inbox)? {
+            loop {
+                let (taken, transaction, unit, pdu) = self.request(&inbox)?;
+                if pdu.is_empty() {
+                    break;
+                }
                 inbox.drain(..taken);
                 thread::sleep(self.delay);
-                let Some(answer) = self.answer(unit, &pdu, reads)? else {
+                let answer = self.answer(unit, &pdu, reads)?;
+                if answer.is_empty() {
                     continue;
-                };
+                }
                 let mut out = Vec::new();
                 let copy = |to: &mut Vec<u8>| to.extend_from_slice(&answer);
                 if self.is_rtu {
@@ -154,8 +165,9 @@ impl Registers {
         }
     }
 
-    /// The first request, or `None` to close the connection.
-    fn request(&self, inbox: &[u8]) -> Option<Option<(usize, u16, u8, Vec<u8>)>> {
+    /// The first request, with an empty PDU while it is incomplete, or `None` to close the connection.
+    fn request(&self, inbox: &[u8]) -> Option<(usize, u16, u8, Vec<u8>)> {
+        const INCOMPLETE: (usize, u16, u8, Vec<u8>) = (0, 0, 0, Vec::new());
         if self.is_rtu {
             // All requests of an examination have eight bytes, but for functions 43 and 17.
             let length = match inbox.get(1) {
@@ -164,27 +176,28 @@ impl Registers {
                 _ => 8,
             };
             let Some(telegram) = inbox.get(..length) else {
-                return Some(None);
+                return Some(INCOMPLETE);
             };
             let (unit, pdu) = rtu::parse(telegram)?;
-            return Some(Some((length, 0, unit, pdu.to_vec())));
+            return Some((length, 0, unit, pdu.to_vec()));
         }
         let parsed = mbap::Telegram::parse(inbox).ok()?;
-        Some(parsed.map(|(telegram, taken)| {
-            (
-                taken,
-                telegram.transaction,
-                telegram.unit,
-                telegram.pdu.to_vec(),
-            )
-        }))
+        let Some((telegram, taken)) = parsed else {
+            return Some(INCOMPLETE);
+        };
+        Some((
+            taken,
+            telegram.transaction,
+            telegram.unit,
+            telegram.pdu.to_vec(),
+        ))
     }
 
-    /// The answer; an inner `None` is silence, an outer one closes the connection.
-    fn answer(&self, unit: u8, pdu: &[u8], reads: &AtomicU16) -> Option<Option<Vec<u8>>> {
-        let refuse = |code: u8| Some(Some(vec![pdu[0] | 0x80, code]));
+    /// The answer, empty for silence, or `None` to close the connection.
+    fn answer(&self, unit: u8, pdu: &[u8], reads: &AtomicU16) -> Option<Vec<u8>> {
+        let refuse = |code: u8| Some(vec![pdu[0] | 0x80, code]);
         if self.unit.is_some_and(|own| own != unit) {
-            return self.others.map_or(Some(None), refuse);
+            return self.others.map_or(Some(Vec::new()), refuse);
         }
         assert!(
             ![5, 6, 15, 16, 22, 23].contains(&pdu[0]),
@@ -216,7 +229,7 @@ impl Registers {
             _ => own.iter().flat_map(|word| word.to_be_bytes()).collect(),
         };
         let length = u8::try_from(values.len()).expect("a short answer");
-        Some(Some([&[pdu[0], length][..], &values].concat()))
+        Some([&[pdu[0], length][..], &values].concat())
     }
 }
 

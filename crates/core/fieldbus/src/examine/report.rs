@@ -79,7 +79,7 @@ impl<'a> Examination<'a> {
         stop: &'a Stop,
     ) -> Self {
         // An answer that takes longer makes all data stale anyway.
-        let patience = (setup.max_age.times(4)).clamp(Nanos::from_millis(500), Nanos::from_secs(2));
+        let patience = (setup.max_age.times(4)).clamp(Nanos::from_millis(500), Nanos::from_secs(1));
         Self {
             setup,
             watched,

@@ -138,7 +138,7 @@ fn list() -> Outcome {
     print("machine", &text)
 }
 
-/// What to do with a machine that was copied.
+/// The advice after a machine was copied.
 fn copied(machine: &BuiltIn, to: &Path) -> String {
     let shown = to.display();
     format!(

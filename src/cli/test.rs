@@ -81,7 +81,7 @@ pub(super) struct Arguments {
 enum Unusable {
     /// There is no such program.
     Name(ProgramError),
-    /// Its source is wrong.
+    /// The source of the program is wrong.
     File(Mistakes),
 }
 
@@ -103,7 +103,7 @@ impl Arguments {
         }
     }
 
-    /// What the tests are asked for, with the program, which is built if it is a text.
+    /// Returns what the tests are asked for, with the program, which is built if it is a text.
     fn wanted(&self, kinds: &'static Kinds) -> Result<Wanted, Unusable> {
         let program = self.program.as_deref().map(|name| {
             let file = Path::new(name);

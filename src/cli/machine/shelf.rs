@@ -9,7 +9,7 @@ use std::path::Path;
 pub(super) struct BuiltIn {
     /// The name of its folder.
     pub(super) name: &'static str,
-    /// Its files: the path within the folder, with `/`, and the text. The first is its driver.cfg.
+    /// The files: the path within the folder, with `/`, and the text. The first is its driver.cfg.
     pub(super) files: &'static [(&'static str, &'static str)],
 }
 

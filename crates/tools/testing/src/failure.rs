@@ -11,7 +11,7 @@ pub struct Failure {
     pub what: String,
     /// Further information, such as the last changes of the signal, one per line.
     pub more: Vec<String>,
-    /// What the program lacks, in the words of the test file: the `hint` of the step whose condition failed.
+    /// The `hint` of the step whose condition failed: what is missing in the program, in the words of the test file.
     pub hint: Option<String>,
 }
 

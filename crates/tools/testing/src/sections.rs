@@ -453,9 +453,9 @@ impl Reader<'_> {
     }
 }
 
-/// What a program lacks that fails here.
+/// The sentence for a program that fails here.
 fn hint_of(value: &Value<'_>) -> Option<Arc<str>> {
-    let text = value.label(HINT_LIMIT, "say in a sentence what the program lacks");
+    let text = value.label(HINT_LIMIT, "say in a sentence what is missing in the program");
     text.map(Arc::from)
 }
 

@@ -36,7 +36,7 @@ pub struct Suite {
     pub(super) bench: Bench,
 }
 
-/// What a command line asks for beside the test files.
+/// The wishes of a command line beside the test files.
 #[derive(Clone, Debug, Default)]
 pub struct Wanted {
     /// True if the branches of a block are counted in all runs.

@@ -24,7 +24,7 @@ pub struct Test {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Step {
     pub(super) place: TextPosition,
-    /// What the program lacks if the step fails, for people.
+    /// The advice if the step fails, for people.
     pub(super) hint: Option<Arc<str>>,
     /// The row of the table that this step is, from 1.
     pub(super) row: Option<usize>,

@@ -86,22 +86,17 @@ fn prepare_and_run(
         machine.copy_to(to).map_err(failed)?;
         return Ok(print("machine", &copied(machine, to)));
     }
-    // Removed at the end.
-    let unpacked = match &found {
+    let (folder, _removed_at_the_end) = match found {
         Found::BuiltIn(machine) => {
             let failed = |error| (error, Outcome::BusFailed);
-            Some(Unpacked::new(machine).map_err(failed)?)
+            let unpacked = Unpacked::new(machine).map_err(failed)?;
+            (unpacked.path().to_owned(), Some(unpacked))
         }
-        Found::Folder(_) => None,
-    };
-    let folder = match (&found, &unpacked) {
-        (Found::Folder(folder), _) => folder.as_path(),
-        (Found::BuiltIn(_), Some(unpacked)) => unpacked.path(),
-        (Found::BuiltIn(_), None) => unreachable!("it was unpacked"),
+        Found::Folder(folder) => (folder, None),
     };
     match &arguments.grade {
-        Some(program) => grade(arguments, folder, program, kinds),
-        None => Ok(host(arguments, folder, kinds)),
+        Some(program) => grade(arguments, &folder, program, kinds),
+        None => Ok(host(arguments, &folder, kinds)),
     }
 }
 

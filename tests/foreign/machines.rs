@@ -6,10 +6,10 @@ use std::process::{Command, Output};
 
 use serde_json::Value;
 
-#[cfg(unix)]
+#[cfg(all(unix, feature = "page"))]
 use crate::commands::Running;
 use crate::harness::iec2c::Compiler;
-#[cfg(unix)]
+#[cfg(all(unix, feature = "page"))]
 use crate::harness::{self};
 use crate::harness::{Absent, Test};
 
@@ -27,7 +27,7 @@ pub(crate) const TESTS: &[(&str, Test)] = &[
         "a_text_is_graded_and_its_mistakes_have_their_lines",
         texts_are_built,
     ),
-    #[cfg(unix)]
+    #[cfg(all(unix, feature = "page"))]
     ("pymodbus_sorts_a_part", pymodbus_sorts_a_part),
 ];
 
@@ -260,16 +260,16 @@ fn texts_are_built() -> Result<(), Absent> {
 }
 
 /// A PLC of pymodbus starts the belt, sees a tall part, and pushes it into the chute.
-#[cfg(unix)]
+#[cfg(all(unix, feature = "page"))]
 fn pymodbus_sorts_a_part() -> Result<(), Absent> {
     let mut python = harness::python_with("main", &["pymodbus"])?;
-    let page = ["--page", "127.0.0.1:0"];
-    let pages = if cfg!(feature = "page") {
-        &page[..]
-    } else {
-        &[]
-    };
-    let arguments = [&["sorting", "--address", "127.0.0.1:0"], pages].concat();
+    let arguments = [
+        "sorting",
+        "--address",
+        "127.0.0.1:0",
+        "--page",
+        "127.0.0.1:0",
+    ];
     let mut machine = Running::of("machine", &arguments);
     let address = machine.after("machine: opening: listening on ");
     let (host, port) = address.rsplit_once(':').expect("an address");

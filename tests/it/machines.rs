@@ -6,7 +6,7 @@ use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-#[cfg(unix)]
+#[cfg(all(unix, feature = "page"))]
 use super::commands::Running;
 use super::testing::{err, out, repository, test};
 use tickbus::driver_cfg::Config;
@@ -29,11 +29,8 @@ fn machine(arguments: &[&str]) -> Output {
 }
 
 /// Arguments for ports that the system chooses.
-fn free_ports() -> Vec<&'static str> {
-    let all = ["--address", "127.0.0.1:0", "--page", "127.0.0.1:0"];
-    let count = if cfg!(feature = "page") { 4 } else { 2 };
-    all[..count].to_vec()
-}
+#[cfg(feature = "page")]
+const FREE_PORTS: [&str; 4] = ["--address", "127.0.0.1:0", "--page", "127.0.0.1:0"];
 
 fn folder_of(name: &str) -> PathBuf {
     repository().join("examples/machines").join(name)
@@ -147,7 +144,7 @@ fn each_machine_is_whole_and_its_picture_shows_only_what_it_has() {
     }
 }
 
-#[cfg(unix)]
+#[cfg(all(unix, feature = "page"))]
 #[test]
 fn a_machine_runs_on_any_bus_that_serves_and_its_folder_does_as_well() {
     let folder = folder_of("traffic-lights");
@@ -160,11 +157,9 @@ fn a_machine_runs_on_any_bus_that_serves_and_its_folder_does_as_well() {
         &["pick-and-place", "--bus", "opcua-server"],
         &[folder],
     ] {
-        let mut ran = Running::of("machine", &[arguments, &free_ports()].concat());
-        if cfg!(feature = "page") {
-            let url = ran.after("machine: page at http://");
-            assert!(url.contains("#token="), "{url}");
-        }
+        let mut ran = Running::of("machine", &[arguments, &FREE_PORTS].concat());
+        let url = ran.after("machine: page at http://");
+        assert!(url.contains("#token="), "{url}");
         // OPC UA opens its line first.
         while !ran
             .after("machine: opening: ")
@@ -252,7 +247,7 @@ fn wrong_calls_are_refused_with_what_would_be_right() {
     #[cfg(feature = "page")]
     {
         fs::remove_file(to.join("picture.svg")).expect("it is there");
-        let refused = machine(&[&[shown], &free_ports()[..]].concat());
+        let refused = machine(&[&[shown], &FREE_PORTS[..]].concat());
         assert_eq!(refused.status.code(), Some(1));
         assert!(
             err(&refused).contains("picture.svg\" cannot be read"),

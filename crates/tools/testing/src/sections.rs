@@ -455,7 +455,10 @@ impl Reader<'_> {
 
 /// The sentence for a program that fails here.
 fn hint_of(value: &Value<'_>) -> Option<Arc<str>> {
-    let text = value.label(HINT_LIMIT, "say in a sentence what is missing in the program");
+    let text = value.label(
+        HINT_LIMIT,
+        "say in a sentence what is missing in the program",
+    );
     text.map(Arc::from)
 }
 

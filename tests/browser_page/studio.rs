@@ -253,3 +253,59 @@ fn the_studio_fits_a_phone_and_shows_names_as_text() {
     shoot(&browser, folder.as_deref(), "studio_phone.png", true);
     assert_quiet(&browser);
 }
+
+/// A line to nobody: the page says why it is not up, finds the device, takes its address over, and is then content.
+#[test]
+fn a_line_is_examined_and_a_found_device_taken_over() {
+    let device = tempfile::tempdir().expect("a folder");
+    let file = device.path().join("device.cfg");
+    let text = "[driver]\nid = 2\nname = \"Press\"\n[fieldbus]\nkind = \"modbus-server\"\naddress = \"127.0.0.1:0\"\n[[signal]]\nname = \"A\"\naddress = \"%QX0.0\"\n[[signal]]\nname = \"B\"\naddress = \"%IX0.0\"\n";
+    fs::write(&file, text).expect("there is room");
+    let mut child = Command::new(env!("CARGO_BIN_EXE_tickbus"))
+        .arg("mirror")
+        .arg(&file)
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("the tickbus program runs");
+    let mut lines = BufReader::new(child.stdout.take().expect("it is piped")).lines();
+    let address = find(&mut lines, "mirror: opening: listening on ");
+    std::thread::spawn(move || lines.count());
+    let nobody = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
+    let closed = nobody.local_addr().expect("an address");
+    drop(nobody);
+    let studio = Studio::new(Some(&format!(
+        "[driver]\nid = 1\nname = \"T\"\n\n[fieldbus]\nkind    = \"modbus-client\"\naddress = \"{closed}\" # the press\n\n[fieldbus.at]\n\"A\" = \"coil:1\"\n\n[[signal]]\nname = \"A\"\naddress = \"%QX0.0\"\n"
+    )));
+    let browser = open(&studio, 1200, 900);
+    let step = |name: &str, verdict: &str| {
+        browser.wait(&format!(
+            "document.getElementById('busy').textContent === '' && [...document.querySelectorAll('#steps li')].some((it) => \
+             it.className === {} && it.textContent.includes({}))",
+            json!(verdict),
+            json!(name)
+        ));
+    };
+    click(&browser, "#examine");
+    step("port", "fail");
+    browser.run(&format!(
+        "document.getElementById('search').open = true; document.getElementById('targets').value = {}",
+        json!(address)
+    ));
+    click(&browser, "#find");
+    browser.wait("document.querySelector('#devices button') !== null");
+    let folder = std::env::var_os("TICKBUS_SCREENSHOTS").map(PathBuf::from);
+    shoot(&browser, folder.as_deref(), "studio_examined.png", false);
+    click(&browser, "#devices button");
+    browser.wait(&format!(
+        "tickbusStudio.file.sheet.fieldbus.address === {}",
+        json!(address)
+    ));
+    let line = format!("address = \"{address}\" # the press\n");
+    assert!(studio.text().contains(&line), "{}", studio.text());
+    click(&browser, "#examine");
+    step("port", "ok");
+    step("addresses", "ok");
+    assert_quiet(&browser);
+    child.kill().expect("it runs");
+    child.wait().expect("it ends");
+}

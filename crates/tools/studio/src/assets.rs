@@ -28,6 +28,11 @@ const OWN: &[Asset] = &[
         text: include_str!("cells.js"),
     },
     Asset {
+        path: "/explore.js",
+        kind: SCRIPT,
+        text: include_str!("explore.js"),
+    },
+    Asset {
         path: "/bus.js",
         kind: SCRIPT,
         text: include_str!("bus.js"),

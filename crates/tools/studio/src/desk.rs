@@ -9,7 +9,7 @@ use tickbus_base::toml_text::{Key, Shape};
 use tickbus_driver_cfg::{Kinds, keys};
 
 use crate::check::{Checked, check};
-use crate::edit::{Edit, Shapes, Unmade, make};
+use crate::edit::{Edit, Shapes, Unmade, adopt, make};
 use crate::file::{OnDisk, Unwritten};
 use crate::history::History;
 use crate::sheet::Sheet;
@@ -125,6 +125,21 @@ impl Desk {
         let (text, done) = make(&self.text, edit, self).map_err(|unmade| match unmade {
             Unmade::Conflict(text) => (409, text),
             Unmade::Impossible(text) => (400, text),
+        })?;
+        self.told.clear();
+        self.change(text.into(), done);
+        Ok(())
+    }
+
+    /// Puts the keys of a found device's `[fieldbus]` table into that of the file.
+    ///
+    /// # Errors
+    ///
+    /// The file is no TOML at the moment.
+    pub(crate) fn adopt(&mut self, table: &str) -> Result<(), Refusal> {
+        self.look();
+        let (text, done) = adopt(&self.text, table).map_err(|unmade| match unmade {
+            Unmade::Conflict(text) | Unmade::Impossible(text) => (400, text),
         })?;
         self.told.clear();
         self.change(text.into(), done);

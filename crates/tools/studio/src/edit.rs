@@ -107,6 +107,41 @@ pub(crate) fn make(
     Ok((format!("{bom}{made}"), told))
 }
 
+/// Puts the keys of a `[fieldbus]` table, which is a text of TOML, into that of a file. Returns the new text, and what was
+/// done.
+pub(crate) fn adopt(text: &str, table: &str) -> Result<(String, String), Unmade> {
+    let body = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let broken = |error: toml_edit::TomlError| {
+        let what = error.message();
+        Unmade::Impossible(format!(
+            "the file is no TOML at the moment ({what}); mend that in its text first"
+        ))
+    };
+    let found = Document::parse(table).map_err(broken)?;
+    let mut document = Document::parse(body).map_err(broken)?.into_mut();
+    let own = table_at(&mut document, &[Step::Key("fieldbus".to_owned())])?;
+    let keys = found.get("fieldbus").and_then(Item::as_table_like);
+    for (name, item) in keys.into_iter().flat_map(TableLike::iter) {
+        let Some(value) = item.as_value() else {
+            continue;
+        };
+        let mut value = value.clone().decorated("", "");
+        match own.get_mut(name) {
+            Some(Item::Value(old)) => {
+                *value.decor_mut() = old.decor().clone();
+                *old = value;
+            }
+            _ => {
+                own.remove(name);
+                layout::insert(own, name, value);
+            }
+        }
+    }
+    let bom = &text[..text.len() - body.len()];
+    let made = layout::ends_as(text, document.to_string());
+    Ok((format!("{bom}{made}"), "took over a device".to_owned()))
+}
+
 fn quoted(text: &str) -> String {
     format!("\"{}\"", shown(text))
 }

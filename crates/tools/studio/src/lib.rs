@@ -8,6 +8,7 @@ mod assets;
 mod check;
 mod desk;
 mod edit;
+mod explore;
 mod file;
 mod history;
 mod layout;

@@ -6,14 +6,16 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use serde_json::json;
-use tickbus_base::time::Monotonic;
-use tickbus_driver_cfg::Kinds;
+use tickbus_base::time::{Monotonic, Stop};
+use tickbus_driver_cfg::{Config, Kinds};
+use tickbus_finder::Target;
 use tickbus_live_page::LivePage;
 use tickbus_web::{Answer, Asset, Change, Document, Outcome, Refused, Site, State, Verb};
 
 use crate::assets::assets;
 use crate::desk::{Desk, Refusal};
 use crate::edit::Edit;
+use crate::explore::{Explored, look_along, search, targets};
 use crate::file::keep;
 use crate::line::{Line, Machine};
 
@@ -61,8 +63,9 @@ struct Room {
     turns: u64,
     /// Why the line does not run although somebody asked for it.
     refused: String,
-    /// True if the file has changed since the line was started.
+    /// The version of the file with which the line was started.
     started: u64,
+    explored: Explored,
 }
 
 /// Edits that could not be written into their file.
@@ -92,6 +95,7 @@ impl Studio {
             turns: 0,
             refused: String::new(),
             started: 0,
+            explored: Explored::default(),
         };
         Ok(Self(Arc::new(Shared {
             kinds: settings.kinds,
@@ -175,6 +179,51 @@ impl Shared {
         }
     }
 
+    /// Notes that something is under way that takes longer than a request may.
+    fn begin(&self, what: &'static str) -> Result<Stop, Refusal> {
+        let mut room = self.room();
+        if room.explored.busy.is_some() {
+            return Err((
+                409,
+                "something is looked for already; wait, or stop it".to_owned(),
+            ));
+        }
+        let stop = Stop::new();
+        room.explored.busy = Some((what, stop.clone()));
+        room.turns += 1;
+        Ok(stop)
+    }
+
+    /// Goes along the line; a line that runs is stopped for that, and started again.
+    fn examine(&self, stop: &Stop) {
+        let path = {
+            let mut room = self.room();
+            room.turns += 1;
+            room.desk.path().to_owned()
+        };
+        let was_open = self.room().line.take().is_some();
+        let steps = match Config::load(&path, self.kinds) {
+            Ok(config) => look_along(&config, stop),
+            // The page shows the mistakes.
+            Err(_) => Vec::new(),
+        };
+        let mut room = self.room();
+        room.explored.examined(steps);
+        room.turns += 1;
+        drop(room);
+        if was_open {
+            // Why not is on the page.
+            let _ = self.start();
+        }
+    }
+
+    fn search(&self, targets: &[Target], stop: &Stop) {
+        let found = search(targets, self.kinds, stop);
+        let mut room = self.room();
+        room.explored.found(found);
+        room.turns += 1;
+    }
+
     fn stop(&self) {
         let mut room = self.room();
         room.line = None;
@@ -195,6 +244,7 @@ impl Shared {
         }
         let mut state = room.desk.json();
         state["state"] = json!(version);
+        state["explored"] = room.explored.json();
         state["line"] = json!({
             "runs": room.line.is_some(),
             "refused": room.refused,
@@ -225,6 +275,20 @@ impl Shared {
                 self.room().desk.save();
                 Ok(())
             }
+            ("use", index) => {
+                let mut room = self.room();
+                let index = index.parse().ok();
+                let table = index.and_then(|index| room.explored.table(index));
+                let table = table.map(str::to_owned);
+                let gone = || (409, "this device is not in the list any more".to_owned());
+                room.desk.adopt(&table.ok_or_else(gone)?)
+            }
+            ("cancel", _) => {
+                if let Some((_, stop)) = &self.room().explored.busy {
+                    stop.stop();
+                }
+                Ok(())
+            }
             ("line", "start") => self.start(),
             ("line", "stop") => {
                 self.stop();
@@ -244,6 +308,15 @@ fn decoded(text: &str) -> String {
 struct StudioSite(Arc<Shared>);
 
 impl StudioSite {
+    /// Does something that takes longer than a request may.
+    fn later(&self, act: impl FnOnce(&Shared) + Send + 'static) {
+        let shared = Arc::clone(&self.0);
+        let thread = std::thread::Builder::new().name("studio".to_owned());
+        if thread.spawn(move || act(&shared)).is_err() {
+            self.0.room().explored.busy = None;
+        }
+    }
+
     /// Answers on a thread of its own: a file on a slow disk, or a line that closes, must not stop other viewers.
     fn apart<T: Send + 'static>(
         &self,
@@ -304,6 +377,29 @@ impl Site for StudioSite {
     fn change(&self, change: Change, answer: Answer<Outcome>) {
         if !change.path.starts_with("/studio/") {
             self.0.live.change(change, answer);
+            return;
+        }
+        let asked = match change.path.as_str() {
+            "/studio/examine" => Some(self.0.begin("examine").map(|stop| (Vec::new(), stop))),
+            "/studio/find" => Some(
+                targets(&change.body)
+                    .map_err(|why| (400, why))
+                    .and_then(|targets| Ok((targets, self.0.begin("find")?))),
+            ),
+            _ => None,
+        };
+        if let Some(asked) = asked {
+            let refused = |(status, text)| Refused { status, text };
+            match asked {
+                Err(why) => answer.give(Err(refused(why))),
+                Ok((targets, stop)) => {
+                    answer.give(Ok(()));
+                    self.later(move |shared| match targets.as_slice() {
+                        [] => shared.examine(&stop),
+                        targets => shared.search(targets, &stop),
+                    });
+                }
+            }
             return;
         }
         self.apart(answer, move |shared| {

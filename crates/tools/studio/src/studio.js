@@ -73,6 +73,7 @@
     }
     showMistakes(checked, state.checked.notes);
     showDiff(state.diff);
+    explore.show(state.explored, mayEdit, checked.length > 0 || state.broken !== null);
     if (document.activeElement !== get("text") || get("text").value === get("text").dataset.was) {
       get("text").value = state.text;
       get("text").dataset.was = state.text;
@@ -224,6 +225,7 @@
     hasPlaces: () => file?.checked.hasPlaces !== false || Object.keys(file.sheet.at).length > 0,
   });
 
+  explore.begin(change);
   get("undo").addEventListener("click", () => change("undo"));
   get("redo").addEventListener("click", () => change("redo"));
   get("start").addEventListener("click", () => change("line", "start"));

@@ -6,8 +6,8 @@ use crate::faults::condition::unknown;
 use crate::faults::diagnosis::OCTET_LIMIT;
 use crate::faults::fault::{LATE_VALUES, MODEL};
 use crate::faults::{
-    AlarmKind, AnswerCodes, AnswerEffect, AnswerTrouble, ChannelError, Diagnosis, Direction, Effect,
-    Elements, Finding, LineEffect, Octets, SignalEffect, WrongAnswer, measure,
+    AlarmKind, AnswerCodes, AnswerEffect, AnswerTrouble, ChannelError, Diagnosis, Direction,
+    Effect, Elements, Finding, LineEffect, Octets, SignalEffect, WrongAnswer, measure,
 };
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Value, did_you_mean, short_number, shown};

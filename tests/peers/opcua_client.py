@@ -241,7 +241,8 @@ async def serve(client):
             if "set" in line:
                 wrote = await client.uaclient.write_attributes([one.nodeid], [ua.DataValue(value)])
                 answer["status"] = wrote[0].name
-            answer["value"] = list(map(dataclasses.asdict, value)) if isinstance(value, list) else dataclasses.asdict(value)
+            is_list = isinstance(value, list)
+            answer["value"] = list(map(dataclasses.asdict, value)) if is_list else dataclasses.asdict(value)
         if "range" in line:
             name, part, kind, values = line["range"]
             if values is None:

@@ -218,7 +218,7 @@ fn a_second_writer_is_counted_or_refused_until_the_first_one_has_left() {
 
 /// Lines of `[fieldbus.at]` that name no member of the variables in tests/peers/axes.NodeSet2.xml.
 #[test]
-fn a_line_that_names_no_single_value_is_told_what_there_is() {
+fn a_line_that_names_no_single_value_is_a_mistake() {
     let model = concat!(
         env!("CARGO_MANIFEST_DIR"),
         "/../../../tests/peers/axes.NodeSet2.xml"

@@ -220,7 +220,7 @@ fn a_wrong_answer_is_no_receipt_and_what_was_asked_is_done() {
 }
 
 #[test]
-fn a_fault_meets_the_requests_that_concern_one_signal_or_so_many_elements() {
+fn a_fault_meets_the_requests_for_one_signal_or_for_a_number_of_elements() {
     let mut device = Alone::open(DEVICES, &KINDS);
     let mut stream = client(device.address());
     device.end.set("status", 0x1234.into());

@@ -211,7 +211,7 @@ impl Content {
     ///
     /// # Errors
     ///
-    /// Signals are in two members of a union, and its number is none.
+    /// Signals are in two members of a union, and its number has no signal.
     pub(super) fn close(&mut self, places: &[&[usize]]) -> Result<(), String> {
         let of_member = |at: usize| -> Vec<&[usize]> {
             let places = places.iter().filter_map(|place| place.split_first());

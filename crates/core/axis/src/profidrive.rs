@@ -108,7 +108,7 @@ pub struct Profidrive {
     positioner: Positioner,
     /// The life sign of the drive, 1 to 15; 0 while the PLC sends none.
     life_sign: u16,
-    /// The last step began in another state.
+    /// The last step began in another state, or at another speed.
     has_changed: bool,
 }
 
@@ -176,6 +176,7 @@ impl Profidrive {
             self.turn(seconds, stw1);
             0
         };
+        self.has_changed |= self.speed.total_cmp(&before).is_ne();
         let actual = measured.speed.unwrap_or(self.speed);
         self.encoder
             .turn(f64::midpoint(measured.speed.unwrap_or(before), actual) / 60.0 * seconds);

@@ -373,8 +373,16 @@ fn the_readers_take_what_their_keys_declare() {
     names.remove("/fault");
     names.extend(FAULT_KINDS.map(|kind| format!("/fault of {}", kind.name)));
     names.remove("/reply");
-    names.remove("/reply/ramp");
-    names.insert("/reply of rule/ramp".to_owned());
+    for (kind, key) in [
+        ("integrator", "flows"),
+        ("rule", "ramp"),
+        ("track", "exits"),
+        ("track", "places"),
+        ("track", "sensors"),
+    ] {
+        names.remove(&format!("/reply/{key}"));
+        names.insert(format!("/reply of {kind}/{key}"));
+    }
     names.extend(REPLY_KINDS.map(|kind| format!("/reply of {}", kind.name)));
     for kind in KINDS.keys() {
         let name = format!("fieldbus of {}", kind.name);

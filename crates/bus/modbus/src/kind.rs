@@ -16,7 +16,7 @@ use tickbus_net::Address;
 use super::{ClientOptions, Line, ModbusClient, ModbusServer, ServerOptions, client, keys, tls};
 use crate::tls::{ClientSide, ServerSide};
 
-/// What the counters of a server say about its clients.
+/// The meaning of a server's counters for its clients.
 const COMPLAINTS: &[Complaint] = &[
     Complaint {
         counter: "modbus-server.unknown_unit",

@@ -79,7 +79,7 @@ pub fn cause(steps: &[Step]) -> Option<&'static str> {
     of(Verdict::Fail).or_else(|| of(Verdict::Warn))
 }
 
-/// Whether a peer that does not speak the bus of the file speaks another one.
+/// Finds out whether a peer that does not speak the bus of the file speaks another one.
 fn recognise(config: &Config, clock: &Arc<dyn Clock>, examination: &mut Examination<'_>) {
     const STRANGE: [&str; 5] = [
         "silent",

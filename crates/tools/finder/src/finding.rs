@@ -36,11 +36,11 @@ pub struct Plan {
 /// One device that answered.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Device {
-    /// Its address.
+    /// The address.
     pub address: SocketAddr,
     /// The name of the bus.
     pub bus: &'static str,
-    /// Its identity and further facts, without control characters.
+    /// The identity and further facts, without control characters.
     pub found: Found,
 }
 

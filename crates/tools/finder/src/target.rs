@@ -1,4 +1,4 @@
-//! What is searched: addresses, ranges and names that the user writes.
+//! The targets of a search: addresses, ranges and names that the user writes.
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::str::FromStr;

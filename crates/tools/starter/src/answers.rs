@@ -55,7 +55,7 @@ impl Plc {
         }
     }
 
-    /// What it is, for the question.
+    /// The description, for the question.
     pub const fn about(self) -> &'static str {
         match self {
             Self::S71500 => "S7-1500: TSEND_C and TRCV_C",
@@ -132,7 +132,7 @@ impl Language {
         }
     }
 
-    /// What it is, for the question.
+    /// The description, for the question.
     pub const fn about(self) -> &'static str {
         match self {
             Self::Java => "Java 17 or newer",

@@ -1,4 +1,4 @@
-//! What `tickbus new` writes: a folder that runs, from a few answers.
+//! The files that `tickbus new` writes: a folder that runs, from a few answers.
 //!
 //! [`plan`] is a function of the [`Answers`] alone: it returns the files, and writes none.
 

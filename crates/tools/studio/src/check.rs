@@ -1,4 +1,4 @@
-//! What the checker says of the text, each with the cell that it is about.
+//! The checker's words about the text, each with the cell that they are about.
 
 use std::path::Path;
 

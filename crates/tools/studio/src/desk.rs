@@ -32,7 +32,7 @@ pub(crate) struct Desk {
     checked: Checked,
     /// Why the file does not have the text.
     unsaved: Option<String>,
-    /// What the page says of the last change that nobody here made, or that was more than a cell.
+    /// The sentence of the page about the last change that nobody here made, or that was more than a cell.
     told: String,
 }
 

@@ -51,7 +51,7 @@ pub(crate) enum Unmade {
     Impossible(String),
 }
 
-/// What an edit needs to know of the keys of a driver.cfg.
+/// The keys of a driver.cfg, as an edit needs to know them.
 pub(crate) trait Shapes {
     /// The keys of a table of the file, such as `driver`, or of each in a list of tables.
     fn keys(&self, table: &str, kind: &str) -> Vec<&'static Key>;
@@ -203,7 +203,7 @@ fn set(
     Ok(format!("{label}: {name} {}", quoted(to.trim())))
 }
 
-/// What an edit is about: the name of the signal, or the table.
+/// The subject of an edit: the name of the signal, or the table.
 fn label(way: &[Step], table: &dyn TableLike, key: &str) -> String {
     let name = table.get("name").map(cell).filter(|_| key != "name");
     match (way, name) {

@@ -1,4 +1,4 @@
-//! What the studio finds out beside the file: why a line is not up, and which PLCs are on a network.
+//! Questions of the studio beside the file: why a line is not up, and which PLCs are on a network.
 
 use std::sync::Arc;
 
@@ -21,11 +21,11 @@ const RATE: u32 = 500;
 /// The last examination and the last search.
 #[derive(Debug, Default)]
 pub(crate) struct Explored {
-    /// What is under way, and how it is stopped.
+    /// The question that is under way, and its stop.
     pub(crate) busy: Option<(&'static str, Stop)>,
     steps: Vec<Step>,
     devices: Vec<Device>,
-    /// What became of the search, in one line.
+    /// The result of the search, in one line.
     told: String,
 }
 

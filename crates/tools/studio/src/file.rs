@@ -10,9 +10,9 @@ use tickbus_base::toml_text::load_text;
 #[derive(Debug)]
 pub(crate) struct OnDisk {
     path: PathBuf,
-    /// What the file had when it was last read or written.
+    /// The text of the file when it was last read or written.
     known: String,
-    /// What the system said of it then.
+    /// The system's data about the file at that time.
     seen: Option<Metadata>,
 }
 
@@ -47,7 +47,7 @@ impl OnDisk {
         &self.path
     }
 
-    /// What the file has, as far as is known.
+    /// The text of the file, as far as is known.
     pub(crate) fn text(&self) -> &str {
         &self.known
     }

@@ -12,7 +12,7 @@ struct Past {
     done: String,
 }
 
-/// What can be undone and done again.
+/// The changes that can be undone and done again.
 #[derive(Debug, Default)]
 pub(crate) struct History {
     past: Vec<Past>,
@@ -33,12 +33,12 @@ impl History {
         self.past.iter().map(|past| past.text.len()).sum()
     }
 
-    /// What would be undone.
+    /// The change that would be undone.
     pub(crate) fn undoes(&self) -> Option<&str> {
         self.past.last().map(|past| past.done.as_str())
     }
 
-    /// What would be done again.
+    /// The change that would be done again.
     pub(crate) fn redoes(&self) -> Option<&str> {
         self.future.last().map(|past| past.done.as_str())
     }

@@ -13,7 +13,7 @@ use tickbus_plc::Program;
 /// The interval of the machine's ticks.
 const TICK: Nanos = Nanos::from_millis(1);
 
-/// What stands for the simulator while there is none.
+/// The stand-in for the simulator while there is none.
 pub struct Opened {
     /// The machine's program.
     pub program: Box<dyn Program>,

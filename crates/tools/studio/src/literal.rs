@@ -1,4 +1,4 @@
-//! What a user types into a cell, as a value of TOML.
+//! The text that a user types into a cell, as a value of TOML.
 
 use tickbus_base::toml_text::{Key, Shape};
 use toml_edit::{Item, Value};

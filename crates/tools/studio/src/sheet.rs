@@ -1,4 +1,4 @@
-//! What the page shows of a text: its tables as cells.
+//! The cells of a text: its tables as the page shows them.
 
 use serde::Serialize;
 use serde_json::{Map, Value as Json, json};

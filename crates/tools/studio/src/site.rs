@@ -22,7 +22,7 @@ use crate::line::{Line, Machine};
 /// The largest body of an edit: the whole text of a file, or a list of tags in base64.
 const BODY: usize = 96 << 20;
 
-/// What a studio is opened with.
+/// The settings of a studio.
 pub struct Settings {
     /// The driver.cfg; it need not exist yet.
     pub path: PathBuf,

@@ -259,7 +259,7 @@ fn refused(status: StatusCode, line: &Line<'_>) -> (&'static str, &'static str) 
     }
 }
 
-/// What is wrong with a signal.
+/// The mistake in a signal.
 struct Trouble {
     cause: &'static str,
     what: String,

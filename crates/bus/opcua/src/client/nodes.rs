@@ -163,7 +163,7 @@ pub(super) async fn check(
     )))
 }
 
-/// Whether a node with these attributes fits the signal.
+/// Returns whether a node with these attributes fits the signal.
 pub(super) fn judge(field: &Field, values: &[DataValue], writes: bool) -> Result<(), String> {
     let Field {
         name,

@@ -45,13 +45,13 @@ pub(super) struct Elements {
     all: Vec<Content>,
 }
 
-/// Whether a member that can be missing is there.
+/// The presence of a member that can be missing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Presence {
     Missing,
     /// A client wrote it.
     Written,
-    /// It is or has a signal, and is always there.
+    /// The member is or has a signal, and is always there.
     Signal,
 }
 

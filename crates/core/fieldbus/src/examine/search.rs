@@ -42,8 +42,8 @@ pub struct Complaint {
     pub counter: &'static str,
     /// The cause, as a fixed word.
     pub cause: &'static str,
-    /// What the clients do.
+    /// The behaviour of the clients.
     pub what: &'static str,
-    /// What to correct.
+    /// The remedy.
     pub next: &'static str,
 }

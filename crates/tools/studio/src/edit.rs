@@ -126,15 +126,12 @@ pub(crate) fn adopt(text: &str, table: &str) -> Result<(String, String), Unmade>
             continue;
         };
         let mut value = value.clone().decorated("", "");
-        match own.get_mut(name) {
-            Some(Item::Value(old)) => {
-                *value.decor_mut() = old.decor().clone();
-                *old = value;
-            }
-            _ => {
-                own.remove(name);
-                layout::insert(own, name, value);
-            }
+        if let Some(Item::Value(old)) = own.get_mut(name) {
+            *value.decor_mut() = old.decor().clone();
+            *old = value;
+        } else {
+            own.remove(name);
+            layout::insert(own, name, value);
         }
     }
     let bom = &text[..text.len() - body.len()];

@@ -52,7 +52,7 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
     }
     if arguments.wait.is_some() && config.bus.complaints().is_none() {
         let why = format!(
-            "doctor: --wait is for a server, to which the PLC connects, and {} is none; leave it out",
+            "doctor: --wait is for a server, to which the PLC connects, and {} is no server; leave it out",
             config.bus.kind()
         );
         return arguments.format.fail("doctor", &why, Outcome::Usage);

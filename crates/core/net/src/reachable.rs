@@ -15,7 +15,7 @@ use crate::{Address, Error};
 /// Why there is no connection with an address.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Unreachable {
-    /// This computer has no route to the address, or a router says that there is none.
+    /// This computer has no route to the address, or a router refuses to forward.
     NoRoute(String),
     /// The computer is there, and nothing listens on the port.
     Refused,

@@ -36,7 +36,7 @@ pub struct Plan {
 /// One device that answered.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Device {
-    /// The address.
+    /// The address of the device.
     pub address: SocketAddr,
     /// The name of the bus.
     pub bus: &'static str,

@@ -259,7 +259,7 @@ fn refused(status: StatusCode, line: &Line<'_>) -> (&'static str, &'static str) 
     }
 }
 
-/// The mistake in a signal.
+/// The trouble with a signal.
 struct Trouble {
     cause: &'static str,
     what: String,

@@ -44,7 +44,7 @@ pub struct Step {
     pub evidence: String,
     /// Further evidence, one line each.
     pub details: Vec<String>,
-    /// The next thing to try; empty if there is none.
+    /// The next thing to try; can be empty.
     pub next: String,
 }
 

@@ -44,6 +44,6 @@ pub struct Complaint {
     pub cause: &'static str,
     /// The behaviour of the clients.
     pub what: &'static str,
-    /// The remedy.
+    /// The correction to make.
     pub next: &'static str,
 }

@@ -181,7 +181,7 @@ impl Wire {
     ///
     /// # Errors
     ///
-    /// There are none.
+    /// No bytes have come, or the connection has ended.
     pub fn receive(&mut self, inbox: &mut Vec<u8>, deadline: Nanos) -> Result<(), WireEnd> {
         let rest = deadline - self.clock.now();
         if rest <= Nanos::ZERO {

@@ -21,7 +21,7 @@ pub(in crate::client) enum Frame {
 /// Why there is no answer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(in crate::client) enum Miss {
-    /// There is none, or the connection has ended.
+    /// The device is silent, or the connection has ended.
     End(WireEnd),
     /// The bytes are no telegram of this framing.
     Alien(Vec<u8>),
@@ -83,7 +83,7 @@ impl Talk {
             Frame::Tcp => mbap::append(self.transaction, unit, &mut request, copy),
             Frame::Rtu => rtu::append(unit, &mut request, copy),
         }
-        // A telegram that came too late for its question is none of this one.
+        // Drops a late answer to an earlier question.
         self.inbox.clear();
         self.wire.send(&request).map_err(Miss::End)?;
         let deadline = self.wire.deadline();

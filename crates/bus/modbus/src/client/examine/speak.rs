@@ -7,7 +7,7 @@ use crate::tls::{self, ClientSide};
 use crate::{Exception, Span, Table};
 use tickbus_fieldbus::examine::{Examination, Peer, WireEnd};
 
-/// The remedy if the device speaks TLS and the file does not.
+/// The next thing to try if the device speaks TLS and the file does not.
 const TLS_EXPECTED: &str = "the device speaks TLS on this port: add tls = { ... } (Modbus/TCP Security), or use its port without \
                             TLS (502)";
 

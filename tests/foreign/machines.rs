@@ -31,12 +31,13 @@ pub(crate) const TESTS: &[(&str, Test)] = &[
     ("pymodbus_sorts_a_part", pymodbus_sorts_a_part),
 ];
 
-const MACHINES: [&str; 5] = [
+const MACHINES: [&str; 6] = [
     "two-tanks",
     "traffic-lights",
     "sorting",
     "pick-and-place",
     "lift",
+    "bottle-rig",
 ];
 
 const EMPTY: &str = "PROGRAM nothing\nVAR\n  lamp AT %QX0.0 : BOOL;\nEND_VAR\nVAR\n  a : BOOL;\nEND_VAR\n  a := TRUE;\nEND_PROGRAM\n\
@@ -146,7 +147,12 @@ fn repository() -> &'static Path {
 }
 
 fn solution(machine: &str) -> String {
-    let path = repository().join(format!("plc/machines/{machine}.st"));
+    // The rig's program is the demo's, too.
+    let file = match machine {
+        "bottle-rig" => "plc/rig/rig.st".to_owned(),
+        machine => format!("plc/machines/{machine}.st"),
+    };
+    let path = repository().join(file);
     std::fs::read_to_string(path).expect("the solution")
 }
 

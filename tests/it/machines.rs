@@ -12,12 +12,13 @@ use super::testing::{err, out, repository, test};
 use tickbus::driver_cfg::Config;
 use tickbus::reply::REPLY_KINDS;
 
-const MACHINES: [&str; 5] = [
+const MACHINES: [&str; 6] = [
     "two-tanks",
     "traffic-lights",
     "sorting",
     "pick-and-place",
     "lift",
+    "bottle-rig",
 ];
 
 fn machine(arguments: &[&str]) -> Output {

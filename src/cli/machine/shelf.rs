@@ -63,6 +63,12 @@ pub(super) const MACHINES: &[BuiltIn] = &[
         "exercises/2-several.toml",
         "exercises/3-door.toml"
     ),
+    machine!(
+        "bottle-rig",
+        "exercises/1-home.toml",
+        "exercises/2-cycle.toml",
+        "exercises/3-jam.toml"
+    ),
 ];
 
 impl BuiltIn {

@@ -156,6 +156,8 @@ impl Desk {
         let (text, told) = tags::add(&self.text, file, body, self.kinds).map_err(|it| (400, it))?;
         let done = told.lines().next().unwrap_or_default().to_owned();
         self.told = told;
+        // What was left out is told, also if nothing was added.
+        self.version += 1;
         self.change(text.into(), done);
         Ok(())
     }
@@ -214,8 +216,11 @@ impl Desk {
                 self.take_theirs(theirs);
             }
             Err(Unwritten::Refused(why)) => {
-                self.unsaved = Some(why);
-                self.version += 1;
+                // Pages ask again and again, which tries again: the same reason is no news.
+                if self.unsaved.as_ref() != Some(&why) {
+                    self.unsaved = Some(why);
+                    self.version += 1;
+                }
             }
         }
         self.check();

@@ -12,12 +12,15 @@ use crate::places::{Step, Way};
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub(crate) enum Edit {
-    /// A cell gets another text; without text the key goes. `was` is what the editor saw there.
+    /// A cell gets another text; without text the key goes. `was` is what the editor saw there, and `of` the name in
+    /// the table.
     Set {
         at: Way,
         #[serde(default)]
         was: String,
         to: String,
+        #[serde(default)]
+        of: Option<String>,
     },
     /// A new table in a list, such as a `[[signal]]`, at this place; its cells are keys and texts, in order.
     Add {
@@ -82,7 +85,12 @@ pub(crate) fn make(
     })?;
     let mut document = parsed.into_mut();
     let told = match edit {
-        Edit::Set { at, was, to } => set(&mut document, at, was, to, shapes)?,
+        Edit::Set { at, was, to, of } => {
+            if let (Some(of), [Step::Key(list), Step::Index(index), ..]) = (of, &at[..]) {
+                find(list_mut(&mut document, list)?, list, *index, of)?;
+            }
+            set(&mut document, at, was, to, shapes)?
+        }
         Edit::Add { list, index, cells } => add(&mut document, list, *index, cells, shapes)?,
         Edit::Remove { list, index, was } => {
             let tables = list_mut(&mut document, list)?;
@@ -315,6 +323,10 @@ fn shift(tables: &mut ArrayOfTables, from: usize, to: usize) {
     let mut table = all.remove(from);
     // Written behind the one before it, and not at the place where it was.
     unplace(&mut table);
+    if to == 0 {
+        // Without one before it, ahead of the next: another table may be last in the text, such as [fieldbus.at].
+        table.set_position(all.first().and_then(Table::position));
+    }
     all.insert(to.min(all.len()), table);
     *tables = all.into_iter().collect();
 }

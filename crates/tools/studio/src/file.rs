@@ -60,25 +60,30 @@ impl OnDisk {
         if now.as_ref().map(stamp) == self.seen.as_ref().map(stamp) {
             return None;
         }
-        self.read()
+        self.read().ok().flatten()
     }
 
-    fn read(&mut self) -> Option<String> {
+    /// Returns the text if it is not the known one.
+    fn read(&mut self) -> Result<Option<String>, String> {
         let now = fs::metadata(&self.path).ok();
-        let text = load_text(&self.path).ok()?;
+        let text = load_text(&self.path).map_err(|mistakes| mistakes.to_string())?;
         self.seen = now;
         if text == self.known {
-            return None;
+            return Ok(None);
         }
         self.known.clone_from(&text);
-        Some(text)
+        Ok(Some(text))
     }
 
     /// Replaces the text of the file, unless another program has changed it.
     pub(crate) fn write(&mut self, text: &str) -> Result<(), Unwritten> {
         // Two changes within the resolution of the file's time are told apart by the text.
-        if let Some(theirs) = self.read() {
-            return Err(Unwritten::Changed(theirs));
+        match self.read() {
+            Ok(Some(theirs)) => return Err(Unwritten::Changed(theirs)),
+            Ok(None) => {}
+            // Others may have changed what cannot be read, such as a text in another encoding.
+            Err(why) if self.path.exists() => return Err(Unwritten::Refused(why)),
+            Err(_) => {}
         }
         self.replace(text)
             .map_err(|error| Unwritten::Refused(error.to_string()))?;
@@ -98,8 +103,10 @@ impl OnDisk {
         let folder = folder.unwrap_or(Path::new("."));
         let mut next = tempfile::Builder::new();
         next.prefix(".driver-cfg-").suffix(".part");
-        let mut next = next.tempfile_in(folder)?;
-        next.write_all(text.as_bytes())?;
+        let next = next
+            .tempfile_in(folder)
+            .map_err(|error| without_name(&error, folder))?;
+        next.as_file().write_all(text.as_bytes())?;
         match present {
             Ok(permissions) => next.as_file().set_permissions(permissions)?,
             Err(_) => usual_permissions(next.as_file())?,
@@ -108,6 +115,13 @@ impl OnDisk {
         next.persist(&self.path).map_err(|error| error.error)?;
         Ok(())
     }
+}
+
+/// The kind of error alone: the whole one has the random name of the new file, which is another at each try.
+fn without_name(error: &io::Error, folder: &Path) -> io::Error {
+    let (kind, folder) = (error.kind(), folder.display());
+    let why = format!("no new file can be made in {folder}, to take its place: {kind}");
+    io::Error::new(kind, why)
 }
 
 /// Writes a text to a new file in the system's temporary folder.

@@ -18,15 +18,7 @@ const WIDTHS: [Width; 5] = [
 /// The next free address behind all others of its area, by area and size: `IX` to `QL`. With several stations, in that
 /// of the last signal.
 pub(crate) fn next(document: &DocumentMut) -> BTreeMap<String, String> {
-    let unit = document
-        .get("driver")
-        .and_then(|table| table.get("addressing"));
-    let is_iec = unit.map(cell).is_some_and(|unit| unit == "iec");
-    let unit = if is_iec {
-        Addressing::Elements
-    } else {
-        Addressing::Bytes
-    };
+    let unit = addressing(document);
     let none = ArrayOfTables::new();
     let signals = document
         .get("signal")
@@ -48,6 +40,28 @@ pub(crate) fn next(document: &DocumentMut) -> BTreeMap<String, String> {
         }
     }
     found
+}
+
+/// The unit of the numbers in the addresses of a file.
+pub(crate) fn addressing(document: &DocumentMut) -> Addressing {
+    let unit = document
+        .get("driver")
+        .and_then(|table| table.get("addressing"));
+    if unit.map(cell).is_some_and(|unit| unit == "iec") {
+        Addressing::Elements
+    } else {
+        Addressing::Bytes
+    }
+}
+
+/// An address as a file with this unit writes it; `None` if it begins within an element.
+pub(crate) fn written(address: Address, unit: Addressing) -> Option<String> {
+    let bytes = address.width.bytes();
+    if unit == Addressing::Bytes || address.width == Width::Bit {
+        return Some(address.to_string());
+    }
+    let (area, letter) = (address.area, address.width.letter());
+    (address.byte % bytes == 0).then(|| format!("{area}{letter}{}", address.byte / bytes))
 }
 
 /// The first address of a size at or behind this bit.

@@ -6,12 +6,14 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use tickbus_base::toml_text::{Mistakes, shown};
 use tickbus_driver_cfg::Kinds;
+use tickbus_image::signal::{Address, Addressing};
 use tickbus_import::{ImportOptions, condensed, import};
 use toml_edit::{ArrayOfTables, Document, DocumentMut, Item, Table};
 
 use crate::edit::kind;
 use crate::layout;
 use crate::literal::cell;
+use crate::propose::{addressing, written};
 
 /// Adds the signals of a list to a text: those whose names it does not have. Returns the new text and what was done.
 ///
@@ -34,8 +36,13 @@ pub(crate) fn add(
         let list: Vec<_> = mistakes.iter().cloned().collect();
         Mistakes::of_list(mistakes.file(), condensed(&list)).to_string()
     })?;
-    let new = parsed(&imported.text)?;
-    let mut document = parsed(text)?;
+    let mut new = parsed(&imported.text)?;
+    let (mark, body) = match text.strip_prefix('\u{feff}') {
+        Some(body) => ("\u{feff}", body),
+        None => ("", text),
+    };
+    let mut document = parsed(body)?;
+    align(&mut document, &mut new)?;
     let (added, known) = append(&mut document, &new)?;
     // Writing to a text cannot fail.
     let mut told = format!("imported {added} signals of {}", shown(file));
@@ -50,7 +57,48 @@ pub(crate) fn add(
         let _ = write!(told, "\n{note}");
     }
     let text = layout::ends_as(text, document.to_string());
-    Ok((text, told))
+    Ok((format!("{mark}{text}"), told))
+}
+
+/// Gives the addresses of `new` the unit of the document; a document without signals gets that of `new`.
+fn align(document: &mut DocumentMut, new: &mut DocumentMut) -> Result<(), String> {
+    let (ours, theirs) = (addressing(document), addressing(new));
+    if ours == theirs {
+        return Ok(());
+    }
+    if document.get("signal").is_none() && theirs == Addressing::Elements {
+        let driver = document
+            .entry("driver")
+            .or_insert_with(|| Item::Table(Table::new()));
+        let driver = driver
+            .as_table_like_mut()
+            .ok_or("driver is no table; mend that in the text")?;
+        driver.remove("addressing");
+        layout::insert(driver, "addressing", "iec".into());
+        return Ok(());
+    }
+    let signals = new.get_mut("signal").and_then(Item::as_array_of_tables_mut);
+    for table in signals.into_iter().flat_map(ArrayOfTables::iter_mut) {
+        let text = table.get("address").map(cell).unwrap_or_default();
+        let Ok(address) = Address::parse(&text, theirs) else {
+            continue;
+        };
+        let text = written(address, ours).ok_or_else(|| {
+            let name = table.get("name").map(cell).unwrap_or_default();
+            format!(
+                "{} has {text}, which is byte {} of the image, and no address in a file with addressing = \"iec\" begins \
+                 there; add the list to a file without that key",
+                shown(&name),
+                address.byte
+            )
+        })?;
+        if let Some(Item::Value(value)) = table.get_mut("address") {
+            let decor = value.decor().clone();
+            *value = text.into();
+            *value.decor_mut() = decor;
+        }
+    }
+    Ok(())
 }
 
 fn parsed(text: &str) -> Result<DocumentMut, String> {

@@ -345,3 +345,145 @@ fn a_file_that_is_not_there_is_made_by_the_first_edit() {
     assert_eq!(fs::read_to_string(&path).expect("it is there"), wanted);
     assert_eq!(desk.mistakes(), 0);
 }
+
+#[test]
+fn a_file_that_is_no_text_any_more_is_not_overwritten() {
+    let mut fixture = Fixture::new(FILE);
+    let theirs = b"# Pr\xfcfstand, saved as Latin-1\n".as_slice();
+    fs::write(fixture.path(), theirs).expect("there is room");
+    let edit = set(&json!(["signal", 0, "address"]), "%QX0.0", "%QX0.3");
+    assert_eq!(fixture.edit(edit), Ok(()));
+    assert_eq!(fs::read(fixture.path()).expect("it is there"), theirs);
+    let json = fixture.desk.json();
+    let why = json["unsaved"].as_str().expect("it says why");
+    assert!(why.contains("UTF-8"), "{why}");
+    // As soon as it is a text again, that is shown, and Undo has the edit.
+    fs::write(fixture.path(), FILE).expect("there is room");
+    fixture.desk.save();
+    let edited = FILE.replace("\"%QX0.0\" ", "\"%QX0.3\" ");
+    assert_eq!(fixture.text(), edited, "the text that it had before");
+}
+
+#[test]
+fn a_file_that_cannot_be_written_is_one_state_as_long_as_the_reason_stays() {
+    let mut fixture = Fixture::new(FILE);
+    let theirs = b"\xff".as_slice();
+    fs::write(fixture.path(), theirs).expect("there is room");
+    let edit = set(&json!(["signal", 0, "address"]), "%QX0.0", "%QX0.3");
+    assert_eq!(fixture.edit(edit), Ok(()));
+    let version = fixture.desk.version();
+    fixture.desk.save();
+    assert_eq!(fixture.desk.version(), version);
+    let text = json!({ "text": { "was": version, "to": "# mine\n" } });
+    assert_eq!(
+        fixture.edit(text),
+        Ok(()),
+        "nobody has changed it meanwhile"
+    );
+    // The words of the system would have a random name.
+    let folder = tempfile::tempdir().expect("there is room");
+    let path = folder.path().join("gone/driver.cfg");
+    let mut desk = Desk::open(&path, &KINDS).expect("an empty file");
+    let edit = serde_json::from_value(set(&json!(["driver", "name"]), "Machine", "Rig"));
+    assert_eq!(desk.edit(&edit.expect("this is an edit")), Ok(()));
+    let version = desk.version();
+    desk.save();
+    assert_eq!(desk.version(), version, "{:?}", desk.unsaved());
+}
+
+#[test]
+fn an_edit_meant_for_a_signal_that_has_moved_changes_no_other() {
+    let mut fixture = Fixture::new(FILE);
+    let remove = json!({ "remove": { "list": "signal", "index": 0, "was": "Belt on" } });
+    assert_eq!(fixture.edit(remove), Ok(()));
+    let after = fixture.text();
+    // Another page still sees "Part seen" as the second.
+    let edit = json!({ "set": { "at": ["signal", 1, "unit"], "was": "", "to": "bar", "of": "Part seen" } });
+    let (status, why) = fixture.edit(edit).expect_err("the second is Level now");
+    assert_eq!(status, 409);
+    assert!(why.contains("Part seen"), "{why}");
+    assert_eq!(fixture.text(), after);
+}
+
+#[test]
+fn a_signal_moves_to_the_first_place_although_another_table_of_the_bus_is_last() {
+    let text = format!("{FILE}\n[fieldbus.at]\n\"Level\" = \"holding:3\"\n");
+    let mut fixture = Fixture::new(&text);
+    let shift = json!({ "move": { "list": "signal", "index": 2, "was": "Level", "to": 0 } });
+    assert_eq!(fixture.edit(shift), Ok(()));
+    let names = |text: &str| {
+        let json = crate::sheet::Sheet::of(text).expect("it is TOML");
+        let json = serde_json::to_value(json).expect("it is JSON");
+        let signals = json["signals"].as_array().expect("a list").clone();
+        signals
+            .iter()
+            .map(|it| it["name"].clone())
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(
+        names(&fixture.text()),
+        ["Level", "Belt on", "Part seen"],
+        "{}",
+        fixture.text()
+    );
+}
+
+fn dropped(fixture: &mut Fixture, file: &str, list: &str) -> Result<String, (u16, String)> {
+    let body = base64::Engine::encode(&base64::engine::general_purpose::STANDARD, list);
+    fixture.desk.import(file, &body)?;
+    let json = fixture.desk.json();
+    Ok(json["told"].as_str().expect("a text").to_owned())
+}
+
+#[test]
+fn a_dropped_list_of_known_signals_alone_is_told_too() {
+    let mut fixture = Fixture::new(FILE);
+    let version = fixture.desk.version();
+    let list = "Name;Path;Data Type;Logical Address\nPart seen;T;Bool;%I0.0\n";
+    let told = dropped(&mut fixture, "tags.csv", list).expect("a list");
+    assert!(told.contains("1 were there already"), "{told}");
+    assert_ne!(fixture.desk.version(), version, "pages read it");
+    assert_eq!(fixture.text(), FILE);
+}
+
+#[test]
+fn a_dropped_list_leaves_the_byte_order_mark() {
+    let mut fixture = Fixture::new(&format!("\u{feff}{FILE}"));
+    let list = "Name;Path;Data Type;Logical Address\nValve;T;Bool;%Q0.5\n";
+    dropped(&mut fixture, "tags.csv", list).expect("a list");
+    let text = fixture.text();
+    assert!(text.starts_with(&format!("\u{feff}{FILE}")), "{text:?}");
+}
+
+/// As CODESYS writes it: the numbers of its addresses count elements.
+const COUNTED: &str = r#"<project xmlns="http://www.plcopen.org/xml/tc6_0200"><fileHeader productName="CODESYS"/><types><pous><pou name="P"><interface><localVars>
+<variable name="Speed" address="%QW1"><type><INT/></type></variable>
+<variable name="Pump" address="%QX7.0"><type><BOOL/></type></variable>
+</localVars></interface></pou></pous></types></project>"#;
+
+#[test]
+fn the_addresses_of_a_dropped_list_mean_in_the_file_what_they_mean_in_the_list() {
+    let mut fixture = Fixture::new(FILE);
+    dropped(&mut fixture, "plc.xml", COUNTED).expect("a list");
+    let sheet = fixture.desk.json()["sheet"].clone();
+    assert_eq!(sheet["signals"][3]["name"], "Speed", "{sheet}");
+    assert_eq!(sheet["signals"][3]["address"], "%QW2", "bytes 2 and 3");
+    assert_eq!(sheet["signals"][4]["address"], "%QX7.0");
+    // A file without signals takes them as the list has them.
+    let (empty, _) = FILE.split_once("# Conveyor").expect("it is there");
+    let mut fixture = Fixture::new(empty);
+    dropped(&mut fixture, "plc.xml", COUNTED).expect("a list");
+    let sheet = fixture.desk.json()["sheet"].clone();
+    assert_eq!(sheet["driver"]["addressing"], "iec");
+    assert_eq!(sheet["signals"][0]["address"], "%QW1");
+    // What lies between two elements cannot be said in a file that counts them.
+    let counted = FILE.replace("[fieldbus]", "addressing = \"iec\"\n\n[fieldbus]");
+    let mut fixture = Fixture::new(&counted);
+    let list = "Name;Path;Data Type;Logical Address\nSpeed;T;Int;%QW6\nOdd;T;Int;%QW9\n";
+    let (_, why) = dropped(&mut fixture, "tags.csv", list).expect_err("it cannot");
+    assert!(why.contains("Odd") && why.contains("%QW9"), "{why}");
+    let list = list.replace("%QW9", "%QW8");
+    dropped(&mut fixture, "tags.csv", &list).expect("a list");
+    let sheet = fixture.desk.json()["sheet"].clone();
+    assert_eq!(sheet["signals"][3]["address"], "%QW3");
+}

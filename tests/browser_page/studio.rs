@@ -12,6 +12,7 @@ use crate::{assert_fits, assert_quiet, click, find};
 
 const ENTER: &str = "\u{e007}";
 const TAB: &str = "\u{e004}";
+const DELETE: &str = "\u{e017}";
 const CONTROL: &str = "\u{e009}";
 
 /// A studio as a process.
@@ -217,6 +218,65 @@ fn two_editors_and_an_editor_of_text_lose_nothing() {
     browser.wait("tickbusStudio.file.redo !== null");
     assert_eq!(studio.text(), theirs);
     assert_quiet(&browser);
+}
+
+/// What is typed while another program changes the file stays, and goes to the signal that it was typed for.
+#[test]
+fn what_is_typed_is_kept_and_reaches_no_other_signal() {
+    let signal = |name: &str, bit: u8| {
+        format!("\n[[signal]]\nname = \"{name}\"\naddress = \"%QX0.{bit}\"\n")
+    };
+    let head = "[driver]\nid = 1\nname = \"T\"\n\n[fieldbus]\nkind = \"modbus-client\"\naddress = \"127.0.0.1:1502\"\n\n\
+                [fieldbus.at]\nA = \"coil:1\"\n";
+    let text = [
+        head,
+        &signal("A", 0),
+        &signal("constructor", 1),
+        &signal("C", 2),
+    ]
+    .concat();
+    let studio = Studio::new(Some(&text));
+    let browser = open(&studio, 1400, 900);
+    browser.wait("document.querySelectorAll('#rows .row').length === 3");
+    let place = browser.run("return document.getElementById('cell-1-at').textContent");
+    assert_eq!(
+        place,
+        json!(""),
+        "every object of JavaScript has a constructor"
+    );
+    // A text that was not applied yet, while the file changes.
+    browser.run(
+        "document.getElementById('text-box').open = true; document.getElementById('text').value += '# mine\\n';",
+    );
+    let theirs = format!("# theirs\n{text}");
+    fs::write(studio.file(), &theirs).expect("there is room");
+    browser.wait("tickbusStudio.file.text.startsWith('# theirs') && !tickbusStudio.isBusy");
+    let typed = "document.getElementById('text').value.endsWith('# mine\\n')";
+    assert_eq!(browser.run(&format!("return {typed}")), json!(true));
+    click(&browser, "#apply");
+    browser.wait("document.getElementById('told').textContent.includes('apply it again')");
+    assert_eq!(browser.run(&format!("return {typed}")), json!(true));
+    assert_eq!(studio.text(), theirs);
+    click(&browser, "#apply");
+    browser.wait("tickbusStudio.file.text.endsWith('# mine\\n') && !tickbusStudio.isBusy");
+    assert_eq!(studio.text(), format!("{text}# mine\n"));
+    // A cell is open when its row goes to another signal.
+    browser.run("cells.go(1, 'unit')");
+    browser.keys("bar");
+    browser.wait("cells.isEditing");
+    let without_first = text.replace(&signal("A", 0), "");
+    fs::write(studio.file(), &without_first).expect("there is room");
+    browser.keys(ENTER);
+    browser.wait("document.getElementById('told').textContent.includes('not at its place')");
+    assert_eq!(studio.text(), without_first);
+    // A signal without a name can be removed as every other.
+    browser.wait("document.querySelectorAll('#rows .row').length === 2");
+    browser.run("cells.go(1, 'name')");
+    browser.keys(DELETE);
+    browser.wait("tickbusStudio.file.sheet.signals[1].name === undefined && !tickbusStudio.isBusy");
+    click(&browser, "#remove");
+    browser.wait("tickbusStudio.file.sheet.signals.length === 1 && !tickbusStudio.isBusy");
+    assert!(!studio.text().contains("%QX0.2"), "{}", studio.text());
 }
 
 #[test]

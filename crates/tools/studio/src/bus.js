@@ -8,6 +8,8 @@ const bus = (() => {
   let tell = {};
   /** What the form shows at present; it is made again only if that changes. */
   let drawn = "";
+  /** True while the form is made again: a field that goes loses its focus then, and its user has typed half of a value. */
+  let isDrawing = false;
 
   const rules = (kind) => schema?.allOf.find((rule) => rule.if.properties.fieldbus.properties.kind.const === kind)?.then.properties.fieldbus;
   const kinds = () => schema?.properties.fieldbus.properties.kind.enum ?? [];
@@ -44,12 +46,14 @@ const bus = (() => {
     field.setAttribute("aria-describedby", help.id);
     if (wrong) field.setAttribute("aria-invalid", "true");
     const commit = () => {
-      if (field.value.trim() === field.dataset.was) return;
+      if (isDrawing || field.value.trim() === field.dataset.was) return;
       const { was } = field.dataset;
       field.dataset.was = field.value.trim();
       tell.set([table, key], was, field.value.trim());
     };
     field.addEventListener("change", commit);
+    // A value that was put back while the form was made again is no change for the browser.
+    field.addEventListener("blur", commit);
     return make("div", { className: "setting" }, ...parts, help);
   }
 
@@ -64,7 +68,9 @@ const bus = (() => {
     const now = JSON.stringify([sheet.kind, sheet.driver, sheet.fieldbus, [...told]]);
     if (now === drawn) return;
     drawn = now;
-    const active = document.activeElement?.id;
+    const field = document.activeElement;
+    const active = field?.id;
+    const typed = field?.dataset.was !== undefined && field.value !== field.dataset.was ? field : null;
     const isOpen = form.querySelector("details")?.open ?? false;
     const { kind } = sheet;
     const select = make("select", { id: "kind" }, ...(kinds().includes(kind) ? [] : [make("option", { value: kind, textContent: kind || "choose a bus" })]), ...kinds().map((name) => make("option", { value: name, textContent: name })));
@@ -81,8 +87,17 @@ const bus = (() => {
     for (const key of Object.keys(sheet.fieldbus)) if (key !== "kind" && !ofBus.includes(key)) lists[0].push(row("fieldbus", key, sheet.fieldbus[key], {}, told.get(`fieldbus/${key}`) ?? "not a setting of this bus"));
     for (const key of Object.keys(driver)) lists[isShown("driver", key, sheet.driver) || required.includes(key) ? 0 : 1].push(row("driver", key, sheet.driver[key] ?? "", driver[key], told.get(`driver/${key}`)));
     const more = make("details", { open: isOpen }, make("summary", { textContent: `${lists[1].length} more settings` }), ...lists[1]);
+    isDrawing = true;
     form.replaceChildren(...parts, ...lists[0], more);
-    if (active?.startsWith("key-") || active === "kind") document.getElementById(active)?.focus({ preventScroll: true });
+    isDrawing = false;
+    if (!active?.startsWith("key-") && active !== "kind") return;
+    const again = document.getElementById(active);
+    if (again && typed) {
+      // What is half typed stays, and knows what was there before it.
+      again.value = typed.value;
+      again.dataset.was = typed.dataset.was;
+    }
+    again?.focus({ preventScroll: true });
   }
 
   return {
@@ -94,6 +109,8 @@ const bus = (() => {
       for (const key of ["type", "latch", "order"]) cells.hint(key, choices(signal[key]));
     },
     show,
+    /** Makes the form again at the next look: a change was refused, and a field shows it. */
+    forget() { drawn = ""; },
     go(table, key) {
       const field = document.getElementById(key === "kind" ? "kind" : `key-${table}-${key}`);
       if (!field) return false;

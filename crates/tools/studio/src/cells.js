@@ -37,7 +37,9 @@ const cells = (() => {
   const text = (index, key) => {
     const signal = sheet?.signals[index];
     if (!signal) return "";
-    return key === "at" ? sheet.at[signal.name] ?? "" : signal[key] ?? "";
+    if (key !== "at") return signal[key] ?? "";
+    // A signal may be named as what every object has, such as "constructor".
+    return Object.hasOwn(sheet.at, signal.name ?? "") ? sheet.at[signal.name] : "";
   };
   const toldOf = (index, key) => told.get(`${index}/${key}`);
 
@@ -204,6 +206,7 @@ const cells = (() => {
     field.setAttribute("aria-label", `${columns[column].title} of ${text(index, "name")}`);
     if (hints[key]) field.setAttribute("list", `hints-${key}`);
     field.dataset.was = was;
+    field.dataset.of = text(index, "name");
     cell.replaceChildren(field);
     field.focus();
     if (typed === undefined) field.select();
@@ -218,9 +221,9 @@ const cells = (() => {
     const cell = closing.parentElement;
     const index = Number(cell.parentElement.dataset.index);
     const { key } = cell.dataset;
-    const { was } = closing.dataset;
+    const { was, of } = closing.dataset;
     cell.textContent = isKept ? closing.value : was;
-    if (isKept && closing.value.trim() !== was) tell.set(index, key, was, closing.value.trim());
+    if (isKept && closing.value.trim() !== was) tell.set(index, key, was, closing.value.trim(), of);
   }
 
   function key(event) {
@@ -242,7 +245,7 @@ const cells = (() => {
     else if (event.key === "Delete" || event.key === "Backspace") {
       const index = shown[row];
       const { key } = columns[column];
-      if (text(index, key)) tell.set(index, key, text(index, key), "");
+      if (text(index, key)) tell.set(index, key, text(index, key), "", text(index, "name"));
     } else if (event.key.length === 1 && event.key !== " ") edit(event.key);
     else return;
     event.preventDefault();

@@ -25,8 +25,8 @@ pub(crate) struct Told {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub(crate) struct Checked {
     pub(crate) mistakes: Vec<Told>,
-    /// Settings that contradict each other, in a file without mistakes.
-    notes: Vec<String>,
+    /// Settings that contradict each other, in a file without mistakes, and what the table does not show.
+    pub(crate) notes: Vec<String>,
     /// True if signals can have addresses in the device on this bus; `None` if a mistake hides it.
     #[serde(rename = "hasPlaces")]
     pub(crate) has_places: Option<bool>,

@@ -226,6 +226,20 @@ impl Desk {
         self.check();
     }
 
+    /// Tries for the last time to write what the file does not have. Returns the text that it still does not have, and
+    /// why: another program's change takes its place on the page, where Undo has it, but there is no page any more.
+    pub(crate) fn settle(&mut self) -> Option<(Arc<str>, String)> {
+        self.unsaved.as_ref()?;
+        let text = Arc::clone(&self.text);
+        self.save();
+        if *self.disk.text() == *text {
+            return None;
+        }
+        let why = self.unsaved.clone();
+        let why = why.unwrap_or_else(|| "another program has changed it meanwhile".to_owned());
+        Some((text, why))
+    }
+
     fn is_new(&mut self) {
         self.version += 1;
         self.check();
@@ -236,6 +250,7 @@ impl Desk {
         let before = self.checked.has_places;
         self.checked = check(self.disk.path(), &self.text, is_on_disk, self.kinds);
         self.checked.has_places = self.checked.has_places.or(before);
+        self.checked.notes.extend(hidden(&self.text));
     }
 
     /// All that the page shows of the file.
@@ -295,6 +310,18 @@ impl Shapes for Desk {
             }
         }
     }
+}
+
+/// What the table does not show of a text although it is about signals.
+fn hidden(text: &str) -> Option<String> {
+    let body = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let document = toml_edit::Document::parse(body).ok()?;
+    let signals = document.get("signal")?;
+    (!signals.is_array_of_tables()).then(|| {
+        "the table shows no signals, because the file has them in brackets, as signal = [ … ]; write each below a line \
+         [[signal]], or edit them in the text"
+            .to_owned()
+    })
 }
 
 /// The lines that differ, each with `+` or `-`, and those around them; empty if there are none.

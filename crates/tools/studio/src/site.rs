@@ -129,14 +129,11 @@ impl Studio {
     pub fn close(self) -> Option<Unsaved> {
         let mut room = self.0.room();
         room.line = None;
-        if room.desk.unsaved().is_some() {
-            room.desk.save();
-        }
-        let (text, why) = room.desk.unsaved()?;
+        let (text, why) = room.desk.settle()?;
         Some(Unsaved {
-            why: why.to_owned(),
-            kept: keep(text),
-            text: text.to_owned(),
+            why,
+            kept: keep(&text),
+            text: text.to_string(),
         })
     }
 }

@@ -74,12 +74,19 @@
     showMistakes(checked, state.checked.notes);
     showDiff(state.diff);
     explore.show(state.explored, mayEdit, checked.length > 0 || state.broken !== null);
-    if (document.activeElement !== get("text") || get("text").value === get("text").dataset.was) {
-      get("text").value = state.text;
-      get("text").dataset.was = state.text;
-      get("text").dataset.version = state.version;
-    }
+    if (!isTextChanged()) showText();
     showLine();
+  }
+
+  /** True if the field of the text has something that was not applied. */
+  const isTextChanged = () => get("text").value !== (get("text").dataset.was ?? "");
+
+  function showText() {
+    const text = get("text");
+    text.value = file.text;
+    // As the field has it: with other ends of lines, perhaps.
+    text.dataset.was = text.value;
+    text.dataset.version = file.version;
   }
 
   function showMistakes(mistakes, notes) {
@@ -159,10 +166,23 @@
     cells.values(values);
   }
 
+  /** The last request for a change: the next one waits for it, so that they arrive as they were made. */
+  let last = Promise.resolve();
+  let changes = 0;
+
   /** Requests a change of the file, and reads what came of it. */
   async function change(path, body = "") {
-    const answer = await room.change("PUT", `/studio/${path}`, body);
+    changes += 1;
+    const request = last.then(() => room.change("PUT", `/studio/${path}`, body));
+    last = request.catch(() => {});
+    const answer = await request;
+    if (!answer?.ok) {
+      // What the page shows in advance is not so.
+      seen = "0";
+      bus.forget();
+    }
     await read();
+    changes -= 1;
     if (answer === null) say("Nobody answers; the change may not have been made.", true);
     else if (!answer.ok) say(answer.text, true);
     return answer?.ok === true;
@@ -170,21 +190,32 @@
 
   const edit = (what) => change("edit", JSON.stringify(what));
 
-  function set(at, was, to) {
-    return edit({ set: { at, was, to } });
+  /** Changes a key; in a list the table has to have the name `of`. */
+  function set(at, was, to, of) {
+    return edit({ set: { at, was, to, of } });
   }
 
-  function setCell(index, key, was, to) {
-    const { name } = file.sheet.signals[index];
-    if (key === "at") return set(["fieldbus", "at", name], was, to);
-    if (key === "name" && file.sheet.at[name] !== undefined && to) return rename(index, name, to);
-    return set(["signal", index, key], was, to);
+  /** Changes a cell of the signal that had the name `of` when the cell was opened. */
+  function setCell(index, key, was, to, of) {
+    if (key === "at") return of ? set(["fieldbus", "at", of], was, to) : refuse("Name the signal first: its place in the device goes by that.");
+    const signal = file.sheet?.signals[index];
+    // What is typed next is for the new name.
+    if (key === "name" && signal && (signal.name ?? "") === of) signal.name = to;
+    if (key === "name" && Object.hasOwn(file.sheet?.at ?? {}, of) && to) return rename(index, of, to);
+    return set(["signal", index, key], was, to, of);
+  }
+
+  /** Says why a change is not made, and shows what the file has. */
+  async function refuse(why) {
+    seen = "0";
+    await read();
+    say(why, true);
   }
 
   /** A signal's place in the device follows its name. */
   async function rename(index, was, to) {
     const place = file.sheet.at[was];
-    if (await set(["signal", index, "name"], was, to) && await set(["fieldbus", "at", was], place, "")) await set(["fieldbus", "at", to], "", place);
+    if (await set(["signal", index, "name"], was, to, was) && await set(["fieldbus", "at", was], place, "")) await set(["fieldbus", "at", to], "", place);
   }
 
   async function add(area) {
@@ -207,7 +238,7 @@
     const to = index + by;
     const signals = file?.sheet?.signals ?? [];
     if (index < 0 || to < 0 || to >= signals.length) return;
-    await edit({ move: { list: "signal", index, was: signals[index].name, to } });
+    await edit({ move: { list: "signal", index, was: signals[index].name ?? "", to } });
   }
 
   async function takeFile(given) {
@@ -234,16 +265,21 @@
   get("add-output").addEventListener("click", () => add("Q"));
   get("remove").addEventListener("click", () => {
     const signal = file?.sheet?.signals[cells.chosen];
-    if (signal) edit({ remove: { list: "signal", index: cells.chosen, was: signal.name } });
+    if (signal) edit({ remove: { list: "signal", index: cells.chosen, was: signal.name ?? "" } });
   });
   get("up").addEventListener("click", () => move(-1));
   get("down").addEventListener("click", () => move(1));
   get("filter").addEventListener("input", () => cells.filter(get("filter").value));
   get("apply").addEventListener("click", async () => {
     const text = get("text");
-    const was = Number(text.dataset.version);
+    const to = text.value;
+    const isDone = await edit({ text: { was: Number(text.dataset.version), to } });
+    // After a conflict the same text can be applied to what is shown now.
     text.dataset.version = file.version;
-    if (await edit({ text: { was, to: text.value } })) text.dataset.was = text.value;
+    if (isDone) text.dataset.was = to;
+  });
+  get("text").addEventListener("keydown", (event) => {
+    if (event.key === "Escape") showText();
   });
   get("import").addEventListener("click", () => get("import-file").click());
   get("import-file").addEventListener("change", async () => {
@@ -303,6 +339,6 @@
   /** For tests. */
   window.tickbusStudio = {
     get file() { return file; },
-    get isBusy() { return reading !== null || next !== null; },
+    get isBusy() { return reading !== null || next !== null || changes > 0; },
   };
 })();

@@ -487,3 +487,35 @@ fn the_addresses_of_a_dropped_list_mean_in_the_file_what_they_mean_in_the_list()
     let sheet = fixture.desk.json()["sheet"].clone();
     assert_eq!(sheet["signals"][3]["address"], "%QW3");
 }
+
+#[test]
+fn signals_in_brackets_are_not_shown_as_none() {
+    let text = "driver.id = 1\ndriver.name = \"x\"\nsignal = [ { name = \"A\", address = \"%IX0.0\" } ]\n\
+                [fieldbus]\nkind = \"loopback\"\nlink = \"rig\"\n";
+    let mut fixture = Fixture::new(text);
+    assert_eq!(fixture.mistakes(), Vec::<Json>::new());
+    let notes = fixture.desk.json()["checked"]["notes"].to_string();
+    assert!(notes.contains("[[signal]]"), "{notes}");
+    let named = set(&json!(["driver", "name"]), "x", "y");
+    assert_eq!(fixture.edit(named), Ok(()));
+    assert_eq!(fixture.text(), text.replace("\"x\"", "\"y\""));
+    assert_eq!(
+        Fixture::new(FILE).desk.json()["checked"]["notes"],
+        json!([])
+    );
+}
+
+#[test]
+fn what_another_program_replaced_at_the_end_is_kept() {
+    let mut fixture = Fixture::new(FILE);
+    assert_eq!(fixture.desk.settle(), None);
+    fs::write(fixture.path(), b"\xff").expect("there is room");
+    let edit = set(&json!(["signal", 0, "address"]), "%QX0.0", "%QX0.3");
+    assert_eq!(fixture.edit(edit), Ok(()));
+    fs::write(fixture.path(), "# theirs\n").expect("there is room");
+    let (text, why) = fixture.desk.settle().expect("the file has another text");
+    assert_eq!(*text, *FILE.replace("\"%QX0.0\" ", "\"%QX0.3\" "));
+    assert!(why.contains("another program"), "{why}");
+    assert_eq!(fixture.text(), "# theirs\n");
+    assert_eq!(fixture.desk.settle(), None, "it is kept once");
+}

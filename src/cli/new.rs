@@ -10,7 +10,8 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use super::Outcome;
 use super::lab::{address, say};
 use tickbus_base::toml_text::nearest;
-use tickbus_driver_cfg::Kinds;
+use tickbus_driver_cfg::{Config, Kinds};
+use tickbus_image::signal::Addressing;
 use tickbus_import::{ImportOptions, import};
 use tickbus_net::Address;
 use tickbus_starter::{Answers, Language, NewFile, Plc, plan};
@@ -82,12 +83,14 @@ fn make(arguments: &Arguments, kinds: &'static Kinds) -> Result<usize, Failure> 
     let folder = &arguments.folder;
     is_free(folder)?;
     let answers = ask(arguments, kinds)?;
-    let files = plan(&answers, kinds).map_err(|mistakes| {
-        let tags = arguments.tags.as_deref().unwrap_or(folder).display();
-        wrong(format!(
-            "{tags}: the signals do not fit {}:\n{mistakes}",
-            answers.plc.about()
-        ))
+    let files = plan(&answers, kinds).map_err(|mistakes| match &answers.signals {
+        Some(_) => {
+            let tags = arguments.tags.as_deref().unwrap_or(folder).display();
+            let plc = answers.plc.about();
+            wrong(format!("{tags}: the signals do not fit {plc}:\n{mistakes}"))
+        }
+        // Such as a name with a control character.
+        None => wrong(format!("the answers do not fit:\n{mistakes}")),
     })?;
     for file in &files {
         write(folder, file).map_err(|error| {
@@ -134,9 +137,8 @@ fn ask(arguments: &Arguments, kinds: &'static Kinds) -> Result<Answers, Failure>
         let why = format!("new: --{option} is missing, and there is no terminal to ask on");
         (why, Outcome::Usage)
     };
-    let of_folder = fs::canonicalize(arguments.folder.parent().unwrap_or(Path::new("")))
-        .unwrap_or_default()
-        .join(arguments.folder.file_name().unwrap_or_default());
+    // One that is there may have another name in the command, such as `.`.
+    let of_folder = fs::canonicalize(&arguments.folder).unwrap_or(arguments.folder.clone());
     let usual = of_folder.file_name().map_or_else(
         || "Machine".into(),
         |name| name.to_string_lossy().into_owned(),
@@ -177,7 +179,9 @@ fn ask(arguments: &Arguments, kinds: &'static Kinds) -> Result<Answers, Failure>
         }
         None => None,
     };
-    let signals = tags.map(|tags| signals(&tags, kinds)).transpose()?;
+    let list = tags.map(|tags| signals(&tags, kinds)).transpose()?;
+    let counts_elements = list.as_ref().is_some_and(|(_, counts)| *counts);
+    let signals = list.map(|(signals, _)| signals);
     let (command, jar, c) = places();
     Ok(Answers {
         name,
@@ -185,14 +189,15 @@ fn ask(arguments: &Arguments, kinds: &'static Kinds) -> Result<Answers, Failure>
         address,
         language,
         signals,
+        counts_elements,
         command,
         jar,
         c,
     })
 }
 
-/// The `[[signal]]` sections of a list of tags.
-fn signals(tags: &Path, kinds: &'static Kinds) -> Result<String, Failure> {
+/// The `[[signal]]` sections of a list of tags, and whether the numbers of their addresses count elements.
+fn signals(tags: &Path, kinds: &'static Kinds) -> Result<(String, bool), Failure> {
     let shown = tags.display().to_string();
     let bytes = fs::read(tags);
     let bytes =
@@ -204,7 +209,10 @@ fn signals(tags: &Path, kinds: &'static Kinds) -> Result<String, Failure> {
         .text
         .find("[[signal]]")
         .unwrap_or(imported.text.len());
-    Ok(format!("\n{}", &imported.text[start..]))
+    let config = Config::parse(&shown, &imported.text, kinds);
+    let config = config.map_err(|mistakes| wrong(mistakes.to_string()))?;
+    let counts_elements = config.addressing == Addressing::Elements;
+    Ok((format!("\n{}", &imported.text[start..]), counts_elements))
 }
 
 /// One line from the terminal; `None` if it is empty.

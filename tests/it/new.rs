@@ -159,5 +159,34 @@ fn nothing_is_overwritten_and_mistakes_are_told() {
         stderr(&list).contains("no.csv: this file cannot be read"),
         "{list:?}"
     );
+    let named = ["new", "m", "--plc", "none", "--simulator", "c", "--name"];
+    let named = tickbus(here, &[&named[..], &["a\u{7}b"]].concat());
+    assert_eq!(named.status.code(), Some(1));
+    let why = stderr(&named);
+    assert!(
+        why.contains("control character") && !why.contains("signals"),
+        "{why}"
+    );
     assert!(!here.join("m").exists(), "nothing is half made");
+}
+
+/// CODESYS counts elements in its addresses, and the machine must not read them as bytes.
+#[test]
+fn the_addresses_of_a_list_keep_their_meaning_and_the_folder_here_its_name() {
+    let folder = tempfile::tempdir().expect("there is room");
+    let list = "<project xmlns=\"http://www.plcopen.org/xml/tc6_0200\"><fileHeader productName=\"CODESYS\"/><types><pous>\
+                <pou name=\"P\"><interface><localVars><variable name=\"Speed\" address=\"%QW1\"><type><INT/></type></variable>\
+                </localVars></interface></pou></pous></types></project>";
+    fs::write(folder.path().join("plc.xml"), list).expect("there is room");
+    let here = folder.path().join("Press 7");
+    fs::create_dir(&here).expect("there is room");
+    let arguments = ["new", ".", "--plc", "codesys", "--simulator", "c"];
+    let made = tickbus(&here, &[&arguments[..], &["--tags", "../plc.xml"]].concat());
+    assert_done(&made);
+    let cfg = fs::read_to_string(here.join("driver.cfg")).expect("it is there");
+    assert!(cfg.contains("name = \"Press 7\""), "{cfg}");
+    assert!(cfg.contains("addressing = \"iec\""), "{cfg}");
+    let checked = tickbus(&here, &["check", "driver.cfg"]);
+    let said = String::from_utf8_lossy(&checked.stdout).into_owned();
+    assert!(said.contains("output_bytes=4"), "{said}");
 }

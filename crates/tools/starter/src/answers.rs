@@ -156,6 +156,8 @@ pub struct Answers {
     pub language: Language,
     /// The text of a driver.cfg with the signals of an imported list; `None` for those of a tank.
     pub signals: Option<String>,
+    /// True if the numbers in the addresses of `signals` count elements, as IEC 61131-3 has it, and not bytes.
+    pub counts_elements: bool,
     /// How this command is called, for the README.
     pub command: String,
     /// The jar for Java, as far as it was found.

@@ -72,9 +72,14 @@ fn driver_cfg(answers: &Answers) -> String {
     let mut text = format!(
         "# The signals of {}, and the bus to its PLC. `tickbus check driver.cfg` lists all mistakes.\n\
          # %I is an input of the PLC, which the machine writes; %Q an output, which it reads.\n\n\
-         [driver]\nid   = 1\nname = {}\n\n[fieldbus]\nkind    = \"{}\"\n",
-        name.replace(['\n', '\r'], " "),
+         [driver]\nid   = 1\nname = {}\n{}\n[fieldbus]\nkind    = \"{}\"\n",
+        name.replace(|letter: char| letter.is_control(), " "),
         quoted(name),
+        if answers.counts_elements {
+            "addressing = \"iec\"             # as in the list: %IW1 is the second word\n"
+        } else {
+            ""
+        },
         answers.plc.kind(),
     );
     // Writing to a text cannot fail.
@@ -138,13 +143,16 @@ fn test(signals: &[Signal], is_tank: bool) -> Option<String> {
 }
 
 fn readme(answers: &Answers, has_plc: bool, has_test: bool) -> String {
-    let command = &answers.command;
+    let command = word(&answers.command);
     let place = if answers.plc == Plc::None {
         "with a small program in the place of its PLC".to_owned()
     } else {
         format!("for {}", answers.plc.about())
     };
-    let mut text = format!("# {}\n\nA simulated machine, {place}.\n\n", answers.name);
+    let name = answers
+        .name
+        .replace(|letter: char| letter.is_control(), " ");
+    let mut text = format!("# {name}\n\nA simulated machine, {place}.\n\n");
     let mut say = |line: String, does: &str| {
         // Writing to a text cannot fail.
         let _ = writeln!(text, "- `{line}`: {does}");
@@ -195,7 +203,10 @@ fn runs(answers: &Answers) -> String {
                 "cc -I {include} machine.c -L {library} -ltickbus -Wl,-rpath,{library} -o machine && ./machine"
             )
         }
-        Language::Replies => format!("{} mirror driver.cfg --replies --page", answers.command),
+        Language::Replies => format!(
+            "{} mirror driver.cfg --replies --page",
+            word(&answers.command)
+        ),
     }
 }
 

@@ -89,7 +89,7 @@ pub(super) fn simulator(
     };
     let text = parts
         .template
-        .replace("{{name}}", name)
+        .replace("{{name}}", &remark(name))
         .replace("{{signals}}", &lines)
         .replace("{{model}}", &model)
         .replace("{{shown}}", shown);
@@ -108,7 +108,7 @@ fn lookups(parts: &Parts, language: Language, signals: &[Signal]) -> String {
         let here = signals.iter().filter(|signal| signal.area == area);
         for signal in here.take(MOST) {
             let variable = variable(&signal.name, language, &mut taken);
-            let text = format!("{:?}", signal.name);
+            let text = literal(&signal.name);
             let line = parts
                 .lookup
                 .replace("NAME", &variable)
@@ -119,15 +119,33 @@ fn lookups(parts: &Parts, language: Language, signals: &[Signal]) -> String {
     lines
 }
 
+/// A text in quotes, as all three languages read it: UTF-8 as it is, quotes and backslashes escaped.
+fn literal(text: &str) -> String {
+    format!("\"{}\"", text.replace('\\', "\\\\").replace('"', "\\\""))
+}
+
+/// A text within a comment of Java or C and a docstring of Python: nothing in it ends or escapes.
+fn remark(text: &str) -> String {
+    let plain = text.replace('\\', "/").replace('"', "'");
+    plain.replace("*/", "* /").replace("/*", "/ *")
+}
+
 /// Words that no variable can have: of the three languages, and of the templates.
 const RESERVED: &[&str] = &[
     "abstract",
+    "alignas",
+    "alignof",
     "and",
+    "args",
     "as",
+    "asm",
     "assert",
+    "async",
     "auto",
     "await",
-    "async",
+    "bitand",
+    "bitor",
+    "bool",
     "boolean",
     "break",
     "byte",
@@ -135,25 +153,34 @@ const RESERVED: &[&str] = &[
     "catch",
     "char",
     "class",
+    "compl",
     "const",
+    "constexpr",
     "continue",
     "def",
     "default",
     "del",
+    "delete",
     "do",
     "double",
     "elif",
     "else",
     "enum",
+    "enumerate",
     "except",
+    "explicit",
+    "export",
     "extends",
     "extern",
-    "false",
     "failed",
+    "false",
+    "fflush",
     "final",
     "finally",
     "float",
     "for",
+    "fprintf",
+    "friend",
     "from",
     "global",
     "goto",
@@ -167,22 +194,29 @@ const RESERVED: &[&str] = &[
     "interface",
     "is",
     "lambda",
+    "linux",
     "long",
     "main",
     "match",
     "mm",
+    "mutable",
+    "namespace",
     "native",
     "new",
+    "noexcept",
     "nonlocal",
     "not",
     "null",
+    "nullptr",
     "number",
+    "operator",
     "or",
-    "package",
     "pace",
+    "package",
     "pass",
     "plc",
     "print",
+    "printf",
     "private",
     "protected",
     "public",
@@ -197,6 +231,9 @@ const RESERVED: &[&str] = &[
     "sizeof",
     "static",
     "status",
+    "stderr",
+    "stdin",
+    "stdout",
     "stop",
     "stopped",
     "strictfp",
@@ -204,7 +241,9 @@ const RESERVED: &[&str] = &[
     "super",
     "switch",
     "synchronized",
+    "template",
     "this",
+    "thread_local",
     "throw",
     "throws",
     "tickbus",
@@ -213,14 +252,22 @@ const RESERVED: &[&str] = &[
     "try",
     "turn",
     "typedef",
+    "typeid",
+    "typename",
+    "typeof",
     "union",
+    "unix",
     "unsigned",
+    "using",
     "values",
     "var",
+    "virtual",
     "void",
     "volatile",
+    "wchar_t",
     "while",
     "with",
+    "xor",
     "yield",
 ];
 

@@ -13,6 +13,7 @@ fn answers(plc: Plc, language: Language) -> Answers {
         address: plc.port().map(Address::local),
         language,
         signals: None,
+        counts_elements: false,
         command: "tickbus".to_owned(),
         jar: None,
         c: None,
@@ -83,4 +84,84 @@ fn a_list_that_does_not_fit_is_refused_with_its_mistakes() {
     answers.signals = Some("\n[[signal]]\nname = \"A\"\naddress = \"%MX0.0\"\n".to_owned());
     let mistakes = plan(&answers, &KINDS).expect_err("%M is no input");
     assert!(mistakes.to_string().contains("%MX0.0"), "{mistakes}");
+}
+
+#[test]
+fn a_name_ends_no_comment_and_no_text() {
+    for name in ["a */ int x; /* b", "C:\\users\\N{x}", "\"\"\" + 1 + \"\"\""] {
+        for language in [Language::Java, Language::Python, Language::C] {
+            let mut answers = answers(Plc::None, language);
+            name.clone_into(&mut answers.name);
+            let files = plan(&answers, &KINDS).expect("it has no mistakes");
+            let simulator = files.iter().find(|it| it.path.starts_with("machine.c"));
+            let simulator =
+                simulator.or_else(|| files.iter().find(|it| it.path.starts_with("machine.py")));
+            let simulator =
+                simulator.or_else(|| files.iter().find(|it| it.path.starts_with("Machine.java")));
+            let simulator = &simulator.expect("there is a simulator").text;
+            let line = simulator
+                .lines()
+                .find(|line| line.contains(": the simulated machine."));
+            let line = line.expect("the name is told");
+            assert!(!line.contains('\\'), "{line}");
+            let ends = if language == Language::Python {
+                "\"\"\""
+            } else {
+                "*/"
+            };
+            assert!(line.ends_with(ends), "{line}");
+            let count = if language == Language::Python { 2 } else { 1 };
+            assert_eq!(line.matches(ends).count(), count, "{line}");
+            assert!(text(&files, "README.md").starts_with("# "));
+            assert!(
+                text(&files, "README.md").lines().nth(1) == Some(""),
+                "one title"
+            );
+        }
+    }
+}
+
+#[test]
+fn names_of_signals_are_texts_of_every_language() {
+    // As macOS writes an umlaut, with a soft hyphen, and what other languages escape.
+    let name = "Tu\u{308}r\u{ad}\"C:\\new\" {x} %s 😀";
+    let toml = name.replace('\\', "\\\\").replace('"', "\\\"");
+    for (language, file) in [
+        (Language::Java, "Machine.java"),
+        (Language::Python, "machine.py"),
+        (Language::C, "machine.c"),
+    ] {
+        let mut answers = answers(Plc::Modbus, language);
+        answers.signals = Some(format!(
+            "\n[[signal]]\nname = \"{toml}\"\naddress = \"%IX0.0\"\n"
+        ));
+        let files = plan(&answers, &KINDS).expect("it has no mistakes");
+        let simulator = text(&files, file);
+        assert!(simulator.contains(&format!("\"{toml}\"")), "{simulator}");
+    }
+}
+
+#[test]
+fn addresses_that_count_elements_keep_their_meaning() {
+    let mut answers = answers(Plc::Codesys, Language::C);
+    answers.signals =
+        Some("\n[[signal]]\nname = \"Speed\"\naddress = \"%QW1\"\ntype = \"INT\"\n".to_owned());
+    answers.counts_elements = true;
+    let files = plan(&answers, &KINDS).expect("it has no mistakes");
+    let config = Config::parse("driver.cfg", text(&files, "driver.cfg"), &KINDS);
+    let config = config.expect("it has no mistakes");
+    assert_eq!(config.table.signals[0].byte, 2);
+}
+
+#[test]
+fn a_command_in_a_folder_with_a_blank_is_one_word() {
+    let mut answers = answers(Plc::Modbus, Language::Replies);
+    "/opt/my tools/tickbus".clone_into(&mut answers.command);
+    let files = plan(&answers, &KINDS).expect("it has no mistakes");
+    let readme = text(&files, "README.md");
+    assert_eq!(
+        readme.matches("'/opt/my tools/tickbus' ").count(),
+        5,
+        "{readme}"
+    );
 }

@@ -171,15 +171,11 @@ fn ask(arguments: &Arguments, kinds: &'static Kinds) -> Result<Answers, Failure>
         )?,
         None => return Err(missing("simulator")),
     };
-    let tags = match &arguments.tags {
-        Some(tags) => Some(tags.clone()),
-        None if is_asked && arguments.plc.is_none() => {
-            line("List of tags, as the PLC's editor exports it [none: a tank with a valve]")?
-                .map(PathBuf::from)
-        }
+    let list = match &arguments.tags {
+        Some(tags) => Some(signals(tags, kinds)?),
+        None if is_asked && arguments.plc.is_none() => ask_list(kinds)?,
         None => None,
     };
-    let list = tags.map(|tags| signals(&tags, kinds)).transpose()?;
     let counts_elements = list.as_ref().is_some_and(|(_, counts)| *counts);
     let signals = list.map(|(signals, _)| signals);
     let (command, jar, c) = places();
@@ -251,6 +247,20 @@ fn choose<T: Copy>(
         let near = nearest(&answer, all.iter().map(|each| name(*each)));
         let near = near.map(|near| format!("; did you mean {near}?"));
         eprintln!("  \"{answer}\" is none of them{}", near.unwrap_or_default());
+    }
+}
+
+/// The signals of a list that is named on the terminal; a wrong answer must not cost those before it.
+fn ask_list(kinds: &'static Kinds) -> Result<Option<(String, bool)>, Failure> {
+    loop {
+        let question = "List of tags, as the PLC's editor exports it [none: a tank with a valve]";
+        let Some(tags) = line(question)? else {
+            return Ok(None);
+        };
+        match signals(Path::new(&tags), kinds) {
+            Ok(list) => return Ok(Some(list)),
+            Err((why, _)) => eprintln!("  {why}"),
+        }
     }
 }
 

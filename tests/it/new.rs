@@ -190,3 +190,32 @@ fn the_addresses_of_a_list_keep_their_meaning_and_the_folder_here_its_name() {
     let said = String::from_utf8_lossy(&checked.stdout).into_owned();
     assert!(said.contains("output_bytes=4"), "{said}");
 }
+
+/// A wrong answer is asked again, also the last one.
+#[test]
+#[cfg(target_os = "linux")]
+fn wrong_answers_on_a_terminal_are_asked_again() {
+    let folder = tempfile::tempdir().expect("there is room");
+    let command = format!("{} new m", env!("CARGO_BIN_EXE_tickbus"));
+    let mut script = Command::new("script")
+        .current_dir(folder.path())
+        .args(["-qec", &command, "/dev/null"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("script is a part of every Linux");
+    let mut keys = script.stdin.take().expect("it is piped");
+    let answers = b"Press 7\nsiemens\n9\nJava\nreplies\nno such.csv\n\n";
+    std::io::Write::write_all(&mut keys, answers).expect("it listens");
+    let output = script.wait_with_output().expect("it ends");
+    drop(keys);
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(said.contains("did you mean java?"), "{said}");
+    assert!(
+        said.contains("no such.csv: this file cannot be read"),
+        "{said}"
+    );
+    assert!(said.contains("new: ok folder=m"), "{said}");
+    let cfg = fs::read_to_string(folder.path().join("m/driver.cfg")).expect("it is there");
+    assert!(cfg.contains("name = \"Press 7\""), "{cfg}");
+}

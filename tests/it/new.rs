@@ -219,3 +219,30 @@ fn wrong_answers_on_a_terminal_are_asked_again() {
     let cfg = fs::read_to_string(folder.path().join("m/driver.cfg")).expect("it is there");
     assert!(cfg.contains("name = \"Press 7\""), "{cfg}");
 }
+
+/// Without a bit among the inputs, or with one behind a number, the folder's own test is right as well.
+#[test]
+fn a_list_of_numbers_passes_its_own_test() {
+    let folder = tempfile::tempdir().expect("there is room");
+    let numbers = "Name;Path;Data Type;Logical Address\nLevel;T;Int;%IW2\nFlow;T;Real;%ID4\n";
+    let both = format!("{numbers}Door shut;T;Bool;%I0.0\n");
+    for (name, list) in [("numbers", numbers), ("both", &both)] {
+        let file = format!("{name}.csv");
+        fs::write(folder.path().join(&file), list).expect("there is room");
+        let arguments = [
+            "new",
+            name,
+            "--plc",
+            "none",
+            "--simulator",
+            "c",
+            "--tags",
+            &file,
+        ];
+        assert_done(&tickbus(folder.path(), &arguments));
+        let new = folder.path().join(name);
+        assert_done(&tickbus(&new, &["test", "tests"]));
+        let test = fs::read_to_string(new.join("tests/first.toml")).expect("it is there");
+        assert_eq!(test.contains("Door shut"), name == "both", "{test}");
+    }
+}

@@ -127,18 +127,28 @@ fn test(signals: &[Signal], is_tank: bool) -> Option<String> {
         return Some(include_str!("texts/tank.toml").to_owned());
     }
     let mut inputs = signals.iter().filter(|signal| signal.area == Area::Input);
-    let input = inputs.next()?;
-    let (on, off) = if input.data_type == DataType::Bool {
-        ("true", "false")
-    } else {
-        ("1", "0")
-    };
+    let first = inputs.clone().next()?;
+    let bit = inputs.find(|signal| signal.data_type == DataType::Bool);
+    let input = bit.unwrap_or(first);
     let name = input.name.replace(['"', '\\'], "'");
+    // Only the changes of bits are counted without being asked for.
+    let (on, off, title, expect) = if bit.is_some() {
+        let title = format!("no change is swallowed while {name} switches");
+        ("true", "false", title, ", expect = \"nothing swallowed\"")
+    } else {
+        (
+            "1",
+            "0",
+            format!("the program runs while {name} changes"),
+            "",
+        )
+    };
     let text = include_str!("texts/tags.toml")
-        .replace("{{input}}", &name)
-        .replace("{{input-key}}", &quoted(&input.name))
         .replace("{{on}}", on)
-        .replace("{{off}}", off);
+        .replace("{{off}}", off)
+        .replace("{{expect}}", expect)
+        .replace("{{input-key}}", &quoted(&input.name))
+        .replace("{{title}}", &title);
     Some(text)
 }
 

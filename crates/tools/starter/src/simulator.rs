@@ -109,10 +109,10 @@ fn lookups(parts: &Parts, language: Language, signals: &[Signal]) -> String {
         for signal in here.take(MOST) {
             let variable = variable(&signal.name, language, &mut taken);
             let text = literal(&signal.name);
-            let line = parts
-                .lookup
-                .replace("NAME", &variable)
-                .replace("TEXT", &text);
+            // A variable such as aTEXT is no place for the text.
+            let around = parts.lookup.split("TEXT");
+            let around = around.map(|part| part.replace("NAME", &variable));
+            let line = around.collect::<Vec<_>>().join(&text);
             let _ = writeln!(lines, "{}{line}", parts.indent);
         }
     }

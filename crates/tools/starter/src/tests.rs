@@ -56,7 +56,16 @@ fn every_combination_has_a_driver_cfg_without_mistakes_a_test_and_a_readme_of_te
 #[test]
 fn the_variables_of_an_imported_list_are_unique_and_no_keywords() {
     let mut answers = answers(Plc::Modbus, Language::Java);
-    let names = ["for", "For", "Level low", "level-low", "3 way", "Öl", "plc"];
+    let names = [
+        "for",
+        "For",
+        "Level low",
+        "level-low",
+        "3 way",
+        "Öl",
+        "plc",
+        "a T E X T",
+    ];
     let signals = names
         .iter()
         .enumerate()
@@ -72,6 +81,7 @@ fn the_variables_of_an_imported_list_are_unique_and_no_keywords() {
         "var signal3Way = plc.signal(\"3 way\");",
         "var l = plc.signal(\"Öl\");",
         "var plc2 = plc.signal(\"plc\");",
+        "var aTEXT = plc.signal(\"a T E X T\");",
     ] {
         assert!(java.contains(line), "{line} in {java}");
     }

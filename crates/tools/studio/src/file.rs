@@ -80,10 +80,9 @@ impl OnDisk {
         // Two changes within the resolution of the file's time are told apart by the text.
         match self.read() {
             Ok(Some(theirs)) => return Err(Unwritten::Changed(theirs)),
-            Ok(None) => {}
             // Others may have changed what cannot be read, such as a text in another encoding.
             Err(why) if self.path.exists() => return Err(Unwritten::Refused(why)),
-            Err(_) => {}
+            Ok(None) | Err(_) => {}
         }
         self.replace(text)
             .map_err(|error| Unwritten::Refused(error.to_string()))?;

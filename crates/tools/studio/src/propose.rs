@@ -61,7 +61,10 @@ pub(crate) fn written(address: Address, unit: Addressing) -> Option<String> {
         return Some(address.to_string());
     }
     let (area, letter) = (address.area, address.width.letter());
-    (address.byte % bytes == 0).then(|| format!("{area}{letter}{}", address.byte / bytes))
+    address
+        .byte
+        .is_multiple_of(bytes)
+        .then(|| format!("{area}{letter}{}", address.byte / bytes))
 }
 
 /// The first address of a size at or behind this bit.

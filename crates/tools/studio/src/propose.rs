@@ -3,9 +3,11 @@
 use std::collections::BTreeMap;
 
 use tickbus_image::signal::{Address, Addressing, Area, Width};
-use toml_edit::{ArrayOfTables, DocumentMut, Table};
+use toml_edit::{ArrayOfTables, DocumentMut};
 
 use crate::literal::cell;
+
+const AREAS: [Area; 2] = [Area::Input, Area::Output];
 
 const WIDTHS: [Width; 5] = [
     Width::Bit,
@@ -15,25 +17,35 @@ const WIDTHS: [Width; 5] = [
     Width::Long,
 ];
 
-/// The next free address behind all others of its area, by area and size: `IX` to `QL`. With several stations, in that
-/// of the last signal.
-pub(crate) fn next(document: &DocumentMut) -> BTreeMap<String, String> {
+/// The next free address behind all others of its area, by station and by area and size: `IX` to `QL`. The station of
+/// signals that name none is "".
+pub(crate) fn next(document: &DocumentMut) -> BTreeMap<String, BTreeMap<String, String>> {
     let unit = addressing(document);
     let none = ArrayOfTables::new();
     let signals = document
         .get("signal")
         .and_then(|item| item.as_array_of_tables());
-    let signals = signals.unwrap_or(&none);
-    let station = |table: &Table| table.get("station").map(cell);
-    let last = signals.iter().last().and_then(station);
+    let mut ends = BTreeMap::from([(String::new(), [0; 2])]);
+    for table in signals.unwrap_or(&none) {
+        let text = |key| table.get(key).map(cell).unwrap_or_default();
+        let ends: &mut [usize; 2] = ends.entry(text("station")).or_default();
+        if let Ok(address) = Address::parse(&text("address"), unit) {
+            let end = 8 * address.byte + usize::from(address.bit) + address.width.bits();
+            let known = AREAS.iter().position(|area| *area == address.area);
+            if let Some(known) = known.and_then(|area| ends.get_mut(area)) {
+                *known = end.max(*known);
+            }
+        }
+    }
+    ends.into_iter()
+        .map(|(station, ends)| (station, proposed(ends, unit)))
+        .collect()
+}
+
+/// The free addresses behind these bits of [`AREAS`].
+fn proposed(ends: [usize; 2], unit: Addressing) -> BTreeMap<String, String> {
     let mut found = BTreeMap::new();
-    for area in [Area::Input, Area::Output] {
-        let here = signals.iter().filter(|table| station(table) == last);
-        let addresses = here.filter_map(|table| table.get("address").map(cell));
-        let addresses = addresses.filter_map(|text| Address::parse(&text, unit).ok());
-        let bits = addresses.filter(|address| address.area == area);
-        let end = bits.map(|it| 8 * it.byte + usize::from(it.bit) + it.width.bits());
-        let end = end.max().unwrap_or(0);
+    for (area, end) in AREAS.into_iter().zip(ends) {
         for width in WIDTHS {
             let key = format!("{}{}", &area.to_string()[1..], width.letter());
             found.insert(key, free(area, width, end, unit));

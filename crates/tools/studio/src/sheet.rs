@@ -1,5 +1,7 @@
 //! The cells of a text: its tables as the page shows them.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 use serde_json::{Map, Value as Json, json};
 use toml_edit::{Document, DocumentMut, Item, TableLike};
@@ -24,8 +26,8 @@ pub(crate) struct Sheet {
     stations: Vec<String>,
     /// Other tables, which the page shows in the text alone.
     others: Vec<String>,
-    /// Free addresses, by area and size, such as `IW`.
-    next: std::collections::BTreeMap<String, String>,
+    /// Free addresses, by station and by area and size, such as `IW`.
+    next: BTreeMap<String, BTreeMap<String, String>>,
 }
 
 impl Sheet {

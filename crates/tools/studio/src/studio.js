@@ -224,8 +224,8 @@
     const present = new Set(signals.map(({ name }) => name));
     let number = signals.length + 1;
     while (present.has(`Signal ${number}`)) number += 1;
-    const given = [["name", `Signal ${number}`], ["address", file.sheet.next[`${area}X`]]];
-    const station = signals[cells.chosen]?.station;
+    const station = (signals[cells.chosen] ?? signals.at(-1))?.station;
+    const given = [["name", `Signal ${number}`], ["address", file.sheet.next[station ?? ""][`${area}X`]]];
     if (station) given.push(["station", station]);
     if (await edit({ add: { list: "signal", index, cells: given } })) {
       cells.go(index, "name");

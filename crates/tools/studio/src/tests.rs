@@ -288,14 +288,21 @@ fn ends_of_lines_and_a_byte_order_mark_stay() {
 #[test]
 fn free_addresses_are_behind_all_others() {
     let fixture = Fixture::new(FILE);
-    let next = &fixture.desk.json()["sheet"]["next"];
+    let next = &fixture.desk.json()["sheet"]["next"][""];
     assert_eq!(next["QX"], "%QX0.1");
     assert_eq!(next["QW"], "%QW2");
     assert_eq!(next["IX"], "%IX4.0");
     assert_eq!(next["ID"], "%ID4");
     let counted = FILE.replace("[fieldbus]", "addressing = \"iec\"\n\n[fieldbus]");
-    let next = &Fixture::new(&counted).desk.json()["sheet"]["next"];
+    let next = &Fixture::new(&counted).desk.json()["sheet"]["next"][""];
     assert_eq!(next["IW"], "%IW3", "bytes 4 and 5 are the last word");
+    // Each station has addresses of its own.
+    let two = FILE.replace("\"%QX0.0\"", "\"%QX4.0\"\nstation = \"A\"");
+    let two = two.replace("\"%IX0.0\"", "\"%QX0.0\"\nstation = \"B\"");
+    let next = &Fixture::new(&two).desk.json()["sheet"]["next"];
+    assert_eq!(next["A"]["QX"], "%QX4.1");
+    assert_eq!(next["B"]["QX"], "%QX0.1");
+    assert_eq!(next["B"]["IX"], "%IX0.0");
 }
 
 #[test]

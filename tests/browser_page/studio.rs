@@ -279,6 +279,40 @@ fn what_is_typed_is_kept_and_reaches_no_other_signal() {
     assert!(!studio.text().contains("%QX0.2"), "{}", studio.text());
 }
 
+/// Why the line did not start is told until the file is another.
+#[test]
+fn a_corrected_mistake_is_no_reason_any_more() {
+    let text = "[driver]\nid = 1\nname = \"T\"\n\n[fieldbus]\nkind = \"socket\"\naddress = \"127.0.0.1:0\"\n\n[[signal]]\nname = \"A\"\naddress = \"%IX0.9\"\n";
+    let studio = Studio::new(Some(text));
+    let browser = open(&studio, 1200, 800);
+    browser.run("await room.change('PUT', '/studio/line', 'start')");
+    wait_line(&browser, "the file has mistakes (1)");
+    fs::write(studio.file(), text.replace("0.9", "0.1")).expect("there is room");
+    browser.wait("tickbusStudio.file.checked.mistakes.length === 0");
+    assert_eq!(wait_line(&browser, "stopped"), "");
+}
+
+/// Values change up to 60 times a second, and the file does not: the page asks for it at its own pace.
+#[test]
+fn a_line_that_changes_all_the_time_makes_no_more_questions_about_the_file() {
+    let text = "[driver]\nid = 1\nname = \"T\"\n\n[fieldbus]\nkind = \"socket\"\naddress = \"127.0.0.1:0\"\n\n[[signal]]\nname = \"A\"\naddress = \"%IX0.0\"\n";
+    let studio = Studio::new(Some(text));
+    let browser = open(&studio, 1200, 800);
+    click(&browser, "#start");
+    wait_line(&browser, "listening on ");
+    let counts = browser.run(
+        "performance.setResourceTimingBufferSize(10000); performance.clearResourceTimings(); \
+         const end = performance.now() + 3000; let forced = 0; \
+         while (performance.now() < end) await room.change('PUT', '/force/1/A', forced++ % 2 ? 'TRUE' : 'FALSE'); \
+         const asked = performance.getEntriesByType('resource').filter(({ name }) => name.includes('/studio/state/')); \
+         return [forced, asked.length];",
+    );
+    let count = |at: usize| counts[at].as_u64().expect("a count");
+    assert!(count(0) > 30, "{counts}");
+    assert!(count(1) <= 8, "{counts}");
+    assert_quiet(&browser);
+}
+
 #[test]
 fn without_its_token_the_studio_shows_nothing() {
     let studio = Studio::new(Some("[driver]\nid = 1\nname = \"Secret plant\"\n"));

@@ -63,6 +63,8 @@ struct Room {
     turns: u64,
     /// Why the line does not run although somebody asked for it.
     refused: String,
+    /// The version of the file that `refused` is about.
+    refused_at: u64,
     /// The version of the file with which the line was started.
     started: u64,
     explored: Explored,
@@ -94,6 +96,7 @@ impl Studio {
             line: None,
             turns: 0,
             refused: String::new(),
+            refused_at: 0,
             started: 0,
             explored: Explored::default(),
         };
@@ -147,6 +150,7 @@ impl Shared {
     fn start(&self) -> Result<(), Refusal> {
         let mut room = self.room();
         room.desk.look();
+        room.refused_at = room.desk.version();
         // The port of the line that runs must be free for the new one.
         room.line = None;
         room.turns += 1;
@@ -234,6 +238,10 @@ impl Shared {
         room.desk.look();
         if room.desk.unsaved().is_some() {
             room.desk.save();
+        }
+        if room.refused_at != room.desk.version() {
+            // Such as mistakes that are corrected now.
+            room.refused.clear();
         }
         let version = format!("{}.{}", room.desk.version(), room.turns);
         if seen == version {

@@ -3,6 +3,8 @@
 // The studio's controller: reads the file's state, hands edits over, and shows the line.
 
 (() => {
+  /** Between two questions about the file, in ms. */
+  const PAUSE = 450;
   const get = (id) => document.getElementById(id);
   let file = null;
   let seen = "0";
@@ -10,6 +12,8 @@
   /** The request for the state that is under way, and the one after it. */
   let reading = null;
   let next = null;
+  /** When the last question was due, in ms. */
+  let asked = 0;
 
   function say(text, isBad = false) {
     get("told").hidden = !text;
@@ -332,7 +336,11 @@
       get("link").textContent = isOld ? "no connection" : "live";
       get("link").className = isOld ? "tag bad" : "tag good";
       document.body.classList.toggle("is-old", isOld);
-      if (!isOld && file && !cells.isEditing) read();
+      // Each event of the line comes here as well, up to 60 times a second.
+      const now = performance.now();
+      if (isOld || !file || cells.isEditing || document.hidden || now - asked < PAUSE) return;
+      asked = now;
+      read();
     },
   });
 

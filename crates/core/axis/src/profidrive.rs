@@ -34,6 +34,10 @@ pub const NO_SETPOINTS: u16 = 1910;
 /// The actual speed counts as the setpoint, and as standstill, within this part of the reference speed.
 const TOLERANCE: f64 = 0.01;
 
+/// The greatest speed of a word, as a part of the reference speed, and the greatest position, in LU (a DINT).
+const MOST_SPEED: f64 = 2.0;
+const MOST_POSITION: f64 = 2_147_483_647.0;
+
 /// The properties of a drive.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setup {
@@ -68,6 +72,21 @@ pub struct Measured {
     pub fault: bool,
     /// A warning is there.
     pub warning: bool,
+}
+
+impl Measured {
+    /// What of it can be: no simulation moves a motor by a number that is none, or beyond what the words can have.
+    fn sound(self, reference_speed: f64) -> Self {
+        let within = |value: Option<f64>, most: f64| {
+            let number = value.filter(|value| !value.is_nan());
+            number.map(|value| value.clamp(-most, most))
+        };
+        Self {
+            speed: within(self.speed, MOST_SPEED * reference_speed),
+            position: within(self.position, MOST_POSITION),
+            ..self
+        }
+    }
 }
 
 /// The words of bits in which edges count, now and in the step before.
@@ -108,7 +127,7 @@ pub struct Profidrive {
     positioner: Positioner,
     /// The life sign of the drive, 1 to 15; 0 while the PLC sends none.
     life_sign: u16,
-    /// The last step began in another state, or at another speed.
+    /// The last step began in another state, or at another speed, or the motor turned in it.
     has_changed: bool,
 }
 
@@ -146,6 +165,7 @@ impl Profidrive {
 
     /// Advances by `seconds`, with the words from the PLC; returns those to the PLC.
     pub fn step(&mut self, seconds: f64, words: &Words, measured: &Measured) -> Words {
+        let measured = &measured.sound(self.setup.reference_speed);
         let was = self.state;
         self.receive(words);
         self.edges.step(&self.words);
@@ -178,6 +198,8 @@ impl Profidrive {
         };
         self.has_changed |= self.speed.total_cmp(&before).is_ne();
         let actual = measured.speed.unwrap_or(self.speed);
+        // The encoder counts on while a simulation turns a motor that the drive does not.
+        self.has_changed |= actual != 0.0;
         self.encoder
             .turn(f64::midpoint(measured.speed.unwrap_or(before), actual) / 60.0 * seconds);
         self.tell(&mut told, stw1, of_mode, actual, measured);

@@ -6,7 +6,8 @@ pub(crate) fn ramped(speed: f64, wanted: f64, rates: [f64; 2], seconds: f64) -> 
     let faster = wanted.abs() > speed.abs() && wanted * speed >= 0.0;
     let rate = rates[usize::from(!faster)].abs();
     let most = if rate > 0.0 {
-        rate * seconds
+        // An infinite rate has no product with a tick of no time.
+        (rate * seconds).max(0.0)
     } else {
         f64::INFINITY
     };
@@ -34,5 +35,17 @@ impl Place {
         }
         self.position += moved;
         false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_infinite_rate_changes_nothing_in_a_tick_of_no_time_and_all_in_any_other() {
+        let rates = [f64::INFINITY; 2];
+        let speeds = [0.0, 0.001].map(|seconds| ramped(1.0, 5.0, rates, seconds));
+        assert_eq!(speeds, [1.0, 5.0]);
     }
 }

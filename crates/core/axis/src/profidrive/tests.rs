@@ -220,6 +220,41 @@ fn the_speed_of_a_simulation_counts_and_a_stop_waits_for_its_standstill() {
 }
 
 #[test]
+fn the_encoder_counts_the_turns_of_a_motor_that_only_the_simulation_turns() {
+    let mut rig = Rig::new(Telegram::Encoder);
+    rig.measured.speed = Some(600.0);
+    rig.for_seconds(2.0);
+    near(rig.told.get(Word::G1Xist1), 20_000.0);
+    rig.measured.speed = Some(0.0);
+    rig.for_seconds(TICK);
+    assert!(!rig.drive.moves());
+}
+
+#[test]
+fn a_simulation_that_fails_for_a_tick_does_not_spoil_the_encoder_and_the_position() {
+    let mut rig = Rig::running(Telegram::Encoder, 0x047F);
+    for wrong in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300] {
+        rig.measured.speed = Some(wrong);
+        rig.for_seconds(TICK);
+    }
+    // At most twice the reference speed counts, for a tick each, and NaN not at all.
+    let wrong_turns = 50.0 * TICK * 2.0;
+    rig.measured.speed = Some(600.0);
+    rig.for_seconds(2.0);
+    let turns = rig.told.get(Word::G1Xist1) / 1000.0;
+    assert!((turns - 20.0).abs() < wrong_turns, "{turns}");
+
+    let mut rig = Rig::new(Telegram::Positioner);
+    rig.measured.position = Some(f64::NAN);
+    rig.write(0x047E);
+    rig.measured.position = Some(400.0);
+    rig.for_seconds(TICK);
+    rig.measured.position = None;
+    rig.for_seconds(TICK);
+    near(rig.told.get(Word::XistA), 400.0);
+}
+
+#[test]
 fn the_life_sign_counts_while_the_plc_sends_one() {
     let mut rig = Rig::running(Telegram::LongSpeed, 0x047F);
     assert_eq!(rig.told.bits(Word::Zsw2), 0x0400, "pulses enabled");

@@ -13,6 +13,9 @@ const WAITING: usize = 32;
 /// The sequence numbers of alarms.
 const SEQUENCE: u8 = 32;
 
+/// The bits of `Alarm_Specifier` beside the sequence number.
+const WITHOUT_SEQUENCE: u8 = 0b111;
+
 /// The alarms that may be unacknowledged at a time, by `Alarm_Mode`; 0 means one of each type.
 const MODES: [usize; 8] = [0, 2, 4, 8, 12, 16, 24, 32];
 
@@ -96,17 +99,29 @@ impl Alarms {
         }
     }
 
-    /// The owner's parameters: the second and the third octet of DPV1.
+    /// The owner's parameters: the second and the third octet of DPV1. Its connection begins anew, so that it acknowledges
+    /// no alarm that it has read before, and one that it has not read waits again.
     pub(crate) fn enable(&mut self, types: u8, mode: u8) {
+        self.unacknowledged.clear();
+        if let Some(mut own) = self.offered.take() {
+            own.specifier &= WITHOUT_SEQUENCE;
+            self.waiting.push_front(own);
+        }
         self.enabled = types & self.support.types;
         let most = MODES[usize::from(mode & 7)].min(self.support.sequence.into());
         self.most = (most > 0).then_some(most);
     }
 
-    /// The owner leaves, and with it all alarms.
+    /// The owner leaves, and with it all alarms; errors that last are told to the next one.
     pub(crate) fn clear(&mut self) {
         self.enabled = 0;
-        self.waiting.clear();
+        let causes = self.causes.iter();
+        let errors = causes.filter(|cause| cause.kind == AlarmKind::Diagnosis);
+        let appears = |cause: &Alarm| Message {
+            alarm: cause.clone(),
+            specifier: 1,
+        };
+        self.waiting = errors.map(appears).collect();
         self.offered = None;
         self.unacknowledged.clear();
     }
@@ -300,6 +315,42 @@ mod tests {
             &[5, 4, 5, 4 << 3, 0xAB],
         ];
         assert_eq!(read, expected);
+    }
+
+    #[test]
+    fn new_parameters_forget_what_was_read_and_keep_what_was_not() {
+        let mut alarms = Alarms::new(AlarmSupport::ALL);
+        alarms.enable(0xFF, 1);
+        alarms.raise(&[1, 2, 3].map(|slot| alarm(AlarmKind::Process, slot)));
+        assert_eq!(next(&mut alarms), Some(vec![5, 2, 1, 0, 0xAB]));
+        assert!(alarms.offer());
+        alarms.enable(0xFF, 0);
+        assert!(!alarms.acknowledge(1, 2, 0), "of the connection before");
+        assert_eq!(next(&mut alarms), Some(vec![5, 2, 2, 0, 0xAB]));
+        assert!(alarms.acknowledge(2, 2, 0));
+        assert!(alarms.offer());
+        // The type is no longer enabled.
+        alarms.enable(0x20, 0);
+        assert_eq!(next(&mut alarms), None);
+        assert_eq!(alarms.take_dropped(), [(AlarmKind::Process, 3)]);
+    }
+
+    #[test]
+    fn an_error_that_lasts_is_told_to_the_next_master() {
+        let mut alarms = Alarms::new(AlarmSupport::ALL);
+        alarms.enable(0xFF, 0);
+        alarms.raise(&[alarm(AlarmKind::Diagnosis, 4), alarm(AlarmKind::Process, 5)]);
+        for _ in 0..2 {
+            assert_eq!(next(&mut alarms), Some(vec![5, 1, 4, 1, 0xAB]));
+            alarms.clear();
+            alarms.enable(0xFF, 0);
+        }
+        alarms.clear();
+        alarms.raise(&[]);
+        alarms.enable(0xFF, 7);
+        assert_eq!(next(&mut alarms), Some(vec![5, 1, 4, 1, 0xAB]));
+        assert_eq!(next(&mut alarms), Some(vec![5, 1, 4, 2 | 1 << 3, 0xAB]));
+        assert_eq!(next(&mut alarms), None);
     }
 
     #[test]

@@ -74,6 +74,7 @@ impl Station {
             self.acyclic.reset(is_enabled);
             let [types, mode] = parameters.alarms().filter(|_| is_enabled).unwrap_or([0; 2]);
             self.acyclic.alarms.enable(types, mode);
+            self.offer_alarm();
             if self.state == State::WaitPrm {
                 self.owner = Some(master);
                 self.state = State::WaitCfg;

@@ -4,6 +4,7 @@ mod folder;
 mod shelf;
 
 use std::fmt::Write as _;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use super::host::{self, Job, span};
@@ -46,6 +47,9 @@ pub(super) struct Arguments {
     host: host::Hosting,
 }
 
+/// The name that stands for all machines.
+const LIST: &str = "list";
+
 /// The file that makes a folder a machine.
 const CONFIG: &str = "driver.cfg";
 
@@ -59,7 +63,7 @@ enum Found {
 }
 
 pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
-    if arguments.name == "list" {
+    if arguments.name == LIST {
         return list();
     }
     match prepare_and_run(arguments, kinds) {
@@ -102,10 +106,17 @@ fn prepare_and_run(
 
 /// The machine called `name`, or in the folder `name`.
 fn find(name: &str) -> Result<Found, (String, Outcome)> {
+    let folder = Path::new(name);
     if let Some(machine) = MACHINES.iter().find(|machine| machine.name == name) {
+        if folder.join(CONFIG).is_file() {
+            // Whoever closes standard error does not want the note.
+            let _ = writeln!(
+                std::io::stderr(),
+                "note: this is the machine that is built in; the one in your folder is ./{name}"
+            );
+        }
         return Ok(Found::BuiltIn(machine));
     }
-    let folder = Path::new(name);
     if folder.is_dir() {
         if folder.join(CONFIG).is_file() {
             return Ok(Found::Folder(folder.to_owned()));
@@ -136,8 +147,12 @@ fn list() -> Outcome {
 /// The advice after a machine was copied.
 fn copied(machine: &BuiltIn, to: &Path) -> String {
     let shown = to.display();
+    // The name of a machine that is built in, and "list", mean those.
+    let mut names = MACHINES.iter().map(|machine| machine.name);
+    let is_taken = to.to_str() == Some(LIST) || names.any(|name| to.to_str() == Some(name));
+    let here = if is_taken { "./" } else { "" };
     format!(
-        "machine: ok files={} folder={shown}\nRead {shown}/README.md; run it by: tickbus machine {shown}\n",
+        "machine: ok files={} folder={shown}\nRead {shown}/README.md; run it by: tickbus machine {here}{shown}\n",
         machine.files.len()
     )
 }

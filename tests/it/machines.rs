@@ -96,6 +96,34 @@ fn a_machine_is_copied_whole_and_nothing_is_overwritten() {
 }
 
 #[test]
+fn a_copy_with_the_name_of_a_machine_is_run_by_its_path() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = |arguments: &[&str]| {
+        Command::new(env!("CARGO_BIN_EXE_tickbus"))
+            .arg("machine")
+            .args(arguments)
+            .current_dir(folder.path())
+            .output()
+            .expect("the tickbus program runs")
+    };
+    let copied = out(&run(&["lift", "--to", "lift"]));
+    assert!(
+        copied.ends_with("run it by: tickbus machine ./lift\n"),
+        "{copied}"
+    );
+    fs::remove_dir_all(folder.path().join("lift/exercises")).expect("it is there");
+    let built_in = run(&["lift", "--grade", "mirror"]);
+    let note = "note: this is the machine that is built in; the one in your folder is ./lift\n";
+    assert!(err(&built_in).starts_with(note), "{}", err(&built_in));
+    let own = run(&["./lift", "--grade", "mirror"]);
+    assert!(
+        err(&own).contains("has no folder \"exercises\""),
+        "{}",
+        err(&own)
+    );
+}
+
+#[test]
 fn each_machine_is_whole_and_its_picture_shows_only_what_it_has() {
     for name in MACHINES {
         let folder = folder_of(name);

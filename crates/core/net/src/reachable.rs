@@ -87,8 +87,8 @@ pub fn try_connect(
     stream.map_err(|error| Unreachable::of(&error))
 }
 
-/// The most connections of a sweep that are under way at the same time, unless the process may have fewer than twice as
-/// many files open. With 0.9 s for each, 500 a second are possible where nobody answers.
+/// The most connections of a sweep that are under way at the same time, unless the process may have fewer than four times
+/// as many files open. With 0.9 s for each, 500 a second are possible where nobody answers.
 const UNDER_WAY: usize = 450;
 
 /// The limits of a [`sweep`].
@@ -114,7 +114,11 @@ pub struct Swept {
     pub failed: usize,
 }
 
-/// Connects to each of `addresses` once, and hands each connection to `found`. Ends early at `stop`.
+/// How often a sweep looks for room while there is none.
+const AGAIN: Nanos = Nanos::from_millis(10);
+
+/// Connects to each of `addresses` once, and hands each connection to `found`. Ends early at `stop`. Begins no further
+/// attempt while `has_room` returns false, so that connections do not pile up behind `found`.
 ///
 /// # Errors
 ///
@@ -124,11 +128,12 @@ pub fn sweep(
     limits: Limits,
     clock: &dyn Clock,
     stop: &Stop,
+    has_room: impl Fn() -> bool,
     mut found: impl FnMut(SocketAddr, std::net::TcpStream),
 ) -> io::Result<Swept> {
     let interval = Nanos(Nanos::from_secs(1).0 / i64::from(limits.rate.max(1)));
     let mut addresses = addresses.peekable();
-    let most = UNDER_WAY.min(raise_open_files() / 2);
+    let most = UNDER_WAY.min(raise_open_files() / 4).max(1);
     let mut set = PollSet::new(stop);
     let mut swept = Swept::default();
     let mut under_way: HashMap<usize, (SocketAddr, TcpStream)> = HashMap::new();
@@ -139,6 +144,7 @@ pub fn sweep(
         let now = clock.now();
         while due <= now
             && under_way.len() < most
+            && has_room()
             && let Some(address) = addresses.next()
         {
             // A pause of this process must not become a burst.
@@ -167,7 +173,8 @@ pub fn sweep(
         }
         let mut deadline = ends.front().map_or(Nanos::MAX, |(end, _)| *end);
         if addresses.peek().is_some() && under_way.len() < most {
-            deadline = deadline.min(due);
+            let next = if has_room() { due } else { now + AGAIN };
+            deadline = deadline.min(next);
         }
         if deadline == Nanos::MAX {
             continue;
@@ -270,6 +277,7 @@ mod tests {
             LIMITS,
             &*Monotonic::shared(),
             &Stop::new(),
+            || true,
             |address, _| found.push(address),
         );
         let swept = swept.expect("the system can");

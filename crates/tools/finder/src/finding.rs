@@ -2,9 +2,11 @@
 
 use std::io;
 use std::net::SocketAddr;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 
+use tickbus_base::os::raise_open_files;
 use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_base::toml_text::printable;
 use tickbus_fieldbus::examine::{Found, Peer, Search, Searching};
@@ -19,6 +21,12 @@ const ANSWER: Nanos = Nanos::from_millis(500);
 
 /// How many devices are asked at the same time.
 const ASKED: usize = 64;
+
+/// The most files that one device takes while it is asked, with those of a further connection and of OPC UA's reactor.
+const FILES: usize = 8;
+
+/// The most connections that wait to be asked: some firewalls accept connections to every address.
+const WAITING: usize = 256;
 
 /// A search.
 #[derive(Clone, Debug)]
@@ -55,7 +63,7 @@ pub struct Findings {
     pub swept: Swept,
 }
 
-/// Searches. Ends early, with what was found so far, at `stop`.
+/// Searches. Ends early, with what was found so far, at `stop`: connections that still wait are not asked then.
 ///
 /// # Errors
 ///
@@ -69,6 +77,13 @@ pub fn find(plan: &Plan, clock: &Arc<dyn Clock>, stop: &Stop) -> io::Result<Find
     let unknown = Mutex::new(Vec::new());
     let (sender, receiver) = std::sync::mpsc::channel();
     let receiver = Mutex::new(receiver);
+    let files = raise_open_files();
+    // A quarter of the files is for attempts, and half of them for devices that are asked.
+    let asked = ASKED
+        .min(files / 2 / FILES)
+        .clamp(1, plan.addresses.len().max(1));
+    let most_waiting = WAITING.min(files / 8).max(1);
+    let waiting = AtomicUsize::new(0);
     let work = || {
         loop {
             let next = receiver
@@ -78,6 +93,10 @@ pub fn find(plan: &Plan, clock: &Arc<dyn Clock>, stop: &Stop) -> io::Result<Find
             let Ok((address, stream)) = next else {
                 return;
             };
+            waiting.fetch_sub(1, Ordering::Relaxed);
+            if stop.is_stopped() {
+                continue;
+            }
             let found = ask(plan, address, stream, clock);
             if found.is_empty() {
                 unknown
@@ -93,7 +112,7 @@ pub fn find(plan: &Plan, clock: &Arc<dyn Clock>, stop: &Stop) -> io::Result<Find
         }
     };
     let swept = thread::scope(|scope| {
-        for number in 0..ASKED.min(plan.addresses.len()) {
+        for number in 0..asked {
             let builder = thread::Builder::new().name(format!("tickbus-ask-{number}"));
             let spawned = builder.spawn_scoped(scope, work);
             // One is enough to end; without any nobody would be asked.
@@ -107,7 +126,9 @@ pub fn find(plan: &Plan, clock: &Arc<dyn Clock>, stop: &Stop) -> io::Result<Find
             limits,
             &**clock,
             stop,
+            || waiting.load(Ordering::Relaxed) < most_waiting,
             |address, stream| {
+                waiting.fetch_add(1, Ordering::Relaxed);
                 // The receivers live as long as this scope.
                 let _ = sender.send((address, stream));
             },
@@ -206,5 +227,56 @@ fn legible(found: Found) -> Found {
         identity: printable(&identity),
         facts: facts.collect(),
         stanza: stanza.lines().map(|line| printable(line) + "\n").collect(),
+    }
+}
+
+#[cfg(all(test, target_os = "linux"))]
+mod tests {
+    use super::*;
+    use std::net::Ipv4Addr;
+    use std::sync::LazyLock;
+    use tickbus_base::time::Monotonic;
+
+    static STOP: LazyLock<Stop> = LazyLock::new(Stop::new);
+    static ASKS: AtomicUsize = AtomicUsize::new(0);
+
+    /// Waits for an answer that does not come, and ends the search, as Ctrl-C does.
+    fn in_vain(mut searching: Searching<'_>) -> Vec<Found> {
+        ASKS.fetch_add(1, Ordering::Relaxed);
+        let deadline = searching.wire.deadline();
+        let _ = searching.wire.receive(&mut Vec::new(), deadline);
+        STOP.stop();
+        Vec::new()
+    }
+
+    /// As behind a firewall that accepts connections to every address.
+    #[test]
+    fn connections_do_not_pile_up_and_at_the_end_nobody_who_waits_is_asked() {
+        let listener = std::net::TcpListener::bind("0.0.0.0:0").expect("a port");
+        let port = listener.local_addr().expect("an address").port();
+        let first = Ipv4Addr::new(127, 21, 0, 1).to_bits();
+        let addresses = (first..first + 3000).map(|bits| (Ipv4Addr::from_bits(bits), port).into());
+        let search = Search {
+            bus: "none",
+            port,
+            ask: in_vain,
+        };
+        let plan = Plan {
+            searches: vec![(search, port)],
+            addresses: addresses.collect(),
+            rate: 2000,
+            units: Vec::new(),
+        };
+        thread::spawn(move || {
+            let mut held = Vec::new();
+            held.extend(listener.incoming());
+        });
+        let clock: Arc<dyn Clock> = Monotonic::shared();
+        let findings = find(&plan, &clock, &STOP).expect("the system can");
+        let asks = ASKS.load(Ordering::Relaxed);
+        assert!((1..=2 * ASKED).contains(&asks), "{asks}");
+        let attempts = findings.swept.attempts;
+        // Some are under way when there is no more room.
+        assert!(attempts < ASKED + WAITING + 300, "{attempts}");
     }
 }

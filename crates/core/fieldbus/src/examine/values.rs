@@ -15,8 +15,12 @@ pub struct Round {
     pub values: Vec<Vec<u8>>,
 }
 
+/// The pauses of further rounds, in 29ths of the usual pause. They are uneven: a bit that blinks in step with even pauses
+/// would always be met in the same state.
+const UNEVEN: [i64; 12] = [3, 7, 4, 11, 5, 9, 2, 13, 6, 10, 8, 12];
+
 impl Examination<'_> {
-    /// How often values are read while they are watched.
+    /// How often values are read while they are watched; a sign of life that does not change then is read some more times.
     pub const ROUNDS: u32 = 5;
 
     /// How long values have to be watched: as configured, and a little longer than each sign of life needs, up to 10 s.
@@ -38,9 +42,17 @@ impl Examination<'_> {
         let span = self.watching();
         let pause = Nanos(span.0 / i64::from(Self::ROUNDS - 1));
         let begin = clock.now();
+        let mut due = begin;
         let mut rounds = Vec::new();
-        for number in 0..Self::ROUNDS {
-            clock.wait_until(begin + pause.times(i64::from(number)), self.stop);
+        let even = (1..Self::ROUNDS).map(|_| pause);
+        let uneven = UNEVEN.map(|part| Nanos(pause.0 / 29 * part));
+        let pauses = std::iter::once(Nanos::ZERO).chain(even).chain(uneven);
+        for pause in pauses {
+            if rounds.len() >= Self::ROUNDS as usize && self.still(&rounds).is_none() {
+                break;
+            }
+            due += pause;
+            clock.wait_until(due, self.stop);
             let Some(round) = read() else {
                 let after = clock.now() - begin;
                 self.fail(
@@ -63,17 +75,7 @@ impl Examination<'_> {
         took.sort_unstable();
         let usual = took.get(took.len() / 2).copied().unwrap_or_default();
         let usual = Nanos(usual.0 / 1000 * 1000);
-        let [first, rest @ ..] = rounds else {
-            return;
-        };
-        let changes = |signal: usize| {
-            let value = |round: &Round| round.values.get(signal).cloned();
-            rest.iter().any(|round| value(round) != value(first))
-        };
-        let span = rounds
-            .last()
-            .map_or(Nanos::ZERO, |last| last.begin - first.begin);
-        let span = Nanos(span.0 / 1_000_000 * 1_000_000);
+        let span = watched_for(rounds);
         if usual > max_age {
             self.fail(
                 "age",
@@ -84,12 +86,8 @@ impl Examination<'_> {
             return;
         }
         let signals = &self.setup.table.signals;
-        let still = self
-            .watched
-            .iter()
-            .find(|(signal, within)| *within < span && !changes(*signal));
-        if let Some((signal, within)) = still {
-            let name = &signals[*signal].name;
+        if let Some((signal, within)) = self.still(rounds) {
+            let name = &signals[signal].name;
             self.fail(
                 "age",
                 "life-sign-still",
@@ -98,7 +96,9 @@ impl Examination<'_> {
             );
             return;
         }
-        let changed = (0..signals.len()).filter(|signal| changes(*signal)).count();
+        let changed = (0..signals.len())
+            .filter(|signal| changes(rounds, *signal))
+            .count();
         self.ok(
             "age",
             format!(
@@ -106,5 +106,111 @@ impl Examination<'_> {
                 signals.len()
             ),
         );
+    }
+
+    /// A sign of life that did not change, and the time within which it has to.
+    fn still(&self, rounds: &[Round]) -> Option<(usize, Nanos)> {
+        let span = watched_for(rounds);
+        let mut watched = self.watched.iter().copied();
+        watched.find(|(signal, within)| *within < span && !changes(rounds, *signal))
+    }
+}
+
+/// True if a signal has not the same value in all rounds.
+fn changes(rounds: &[Round], signal: usize) -> bool {
+    let mut values = rounds.iter().map(|round| round.values.get(signal));
+    let first = values.next();
+    values.any(|value| Some(value) != first)
+}
+
+/// The time from the first round to the last one, in milliseconds.
+fn watched_for(rounds: &[Round]) -> Nanos {
+    let (Some(first), Some(last)) = (rounds.first(), rounds.last()) else {
+        return Nanos::ZERO;
+    };
+    Nanos((last.begin - first.begin).0 / 1_000_000 * 1_000_000)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{BusSetup, Events, Role};
+    use std::path::Path;
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicI64, Ordering};
+    use std::time::Duration;
+    use tickbus_base::time::{Clock, Stop};
+    use tickbus_image::signal::{Area, DataType, Signal, SignalTable};
+
+    /// A clock that passes by waiting alone.
+    #[derive(Debug, Default)]
+    struct Waiting(AtomicI64);
+
+    impl Clock for Waiting {
+        fn now(&self) -> Nanos {
+            Nanos(self.0.load(Ordering::Relaxed))
+        }
+
+        fn wait_until(&self, deadline: Nanos, _: &Stop) {
+            self.0.store(deadline.0, Ordering::Relaxed);
+        }
+
+        fn wait_with(&self, _: Nanos, _: &Stop, sleep: &mut dyn FnMut(Option<Duration>)) {
+            sleep(Some(Duration::ZERO));
+        }
+    }
+
+    /// The cause of the step `age`, for a bit that changes after each `half`, and the number of readings.
+    fn blinking(half: Nanos, watch: Nanos) -> (Option<&'static str>, usize) {
+        let signals = vec![Signal::new("Life", Area::Output, 0, DataType::Bool)];
+        let table = SignalTable::of_one_station(0, 1, signals);
+        let clock: Arc<dyn Clock> = Arc::new(Waiting::default());
+        let stop = Stop::new();
+        let setup = BusSetup {
+            name: "x",
+            id: 1,
+            folder: Path::new(""),
+            role: Role::Device,
+            table: &table,
+            cycle: None,
+            max_age: Nanos::from_millis(100),
+            events: Events::None,
+            clock: &clock,
+            hosted: None,
+        };
+        let watched = vec![(0, Nanos::from_millis(600))];
+        let mut examination = Examination::new(setup, watched, watch, &stop);
+        let mut readings = 0;
+        examination.watch_values(|| {
+            readings += 1;
+            let begin = clock.now();
+            let values = vec![vec![u8::from(begin.0 / half.0 % 2 == 1)]];
+            let took = Nanos::from_millis(1);
+            Some(Round {
+                begin,
+                took,
+                values,
+            })
+        });
+        (examination.steps[0].cause, readings)
+    }
+
+    #[test]
+    fn a_sign_of_life_that_blinks_in_step_with_the_readings_is_seen() {
+        for (watch, half) in [
+            (1000, 125),
+            (2000, 250),
+            (2000, 125),
+            (1000, 25),
+            (4000, 500),
+        ] {
+            let (watch, half) = (Nanos::from_millis(watch), Nanos::from_millis(half));
+            let (cause, _) = blinking(half, watch);
+            assert_eq!(cause, None, "{half} during {watch}");
+        }
+        let second = Nanos::from_secs(1);
+        assert_eq!(blinking(Nanos::from_millis(300), second), (None, 5));
+        let still = blinking(Nanos::from_secs(100), second);
+        assert_eq!(still, (Some("life-sign-still"), 17));
     }
 }

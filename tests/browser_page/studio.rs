@@ -220,7 +220,7 @@ fn two_editors_and_an_editor_of_text_lose_nothing() {
     assert_quiet(&browser);
 }
 
-/// What is typed while another program changes the file stays, and goes to the signal that it was typed for.
+/// Text that is typed while another program changes the file stays, and goes to the signal that it was typed for.
 #[test]
 fn what_is_typed_is_kept_and_reaches_no_other_signal() {
     let signal = |name: &str, bit: u8| {

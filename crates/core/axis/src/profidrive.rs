@@ -75,7 +75,7 @@ pub struct Measured {
 }
 
 impl Measured {
-    /// What of it can be: no simulation moves a motor by a number that is none, or beyond what the words can have.
+    /// Returns the values that are possible: no simulation moves a motor by a NaN, or beyond what the words can have.
     fn sound(self, reference_speed: f64) -> Self {
         let within = |value: Option<f64>, most: f64| {
             let number = value.filter(|value| !value.is_nan());

@@ -312,7 +312,7 @@ impl Shapes for Desk {
     }
 }
 
-/// What the table does not show of a text although it is about signals.
+/// Says which signals of a text the table does not show.
 fn hidden(text: &str) -> Option<String> {
     let body = text.strip_prefix('\u{feff}').unwrap_or(text);
     let document = toml_edit::Document::parse(body).ok()?;

@@ -89,7 +89,13 @@ pub(crate) fn make(
             if let (Some(of), [Step::Key(list), Step::Index(index), ..]) = (of, &at[..]) {
                 find(list_mut(&mut document, list)?, list, *index, of)?;
             }
-            set(&mut document, at, was, to, shapes)?
+            let told = set(&mut document, at, was, to, shapes)?;
+            if let [Step::Key(list), Step::Index(_), Step::Key(key)] = &at[..]
+                && (list.as_str(), key.as_str()) == ("signal", "name")
+            {
+                follow(&mut document, was, to.trim());
+            }
+            told
         }
         Edit::Add { list, index, cells } => add(&mut document, list, *index, cells, shapes)?,
         Edit::Remove { list, index, was } => {
@@ -208,6 +214,48 @@ fn set(
     Ok(format!("{label}: {name} {}", quoted(to.trim())))
 }
 
+/// The place in the device follows the name of its signal, if no other has either name.
+fn follow(document: &mut DocumentMut, was: &str, to: &str) {
+    let signals = document.get("signal").and_then(Item::as_array_of_tables);
+    let has_was = |table: &Table| name_of(table) == was;
+    if to.is_empty() || signals.is_some_and(|signals| signals.iter().any(has_was)) {
+        return;
+    }
+    let at = document
+        .get_mut("fieldbus")
+        .and_then(|table| table.get_mut("at"));
+    let Some(Item::Table(table)) = at else {
+        return;
+    };
+    if table.contains_key(to) || !table.contains_key(was) {
+        return;
+    }
+    let mut renamed = table.clone();
+    renamed.clear();
+    for (name, _) in table.iter() {
+        let Some((key, item)) = table.get_key_value(name) else {
+            continue;
+        };
+        let mut key = key.clone();
+        if name == was {
+            // The column of the equal sign stays, as far as the new name leaves room for it.
+            let before = key.display_repr().chars().count();
+            let mut new = toml_edit::Key::new(to).with_leaf_decor(key.leaf_decor().clone());
+            let blanks = key.leaf_decor().suffix().and_then(|it| it.as_str());
+            let end = before + blanks.unwrap_or(" ").chars().count();
+            let blanks = end.saturating_sub(new.display_repr().chars().count());
+            new.leaf_decor_mut().set_suffix(" ".repeat(blanks.max(1)));
+            key = new;
+        }
+        renamed.insert_formatted(&key, item.clone());
+    }
+    *table = renamed;
+}
+
+fn name_of(table: &Table) -> String {
+    table.get("name").map(cell).unwrap_or_default()
+}
+
 /// The subject of an edit: the name of the signal, or the table.
 fn label(way: &[Step], table: &dyn TableLike, key: &str) -> String {
     let name = table.get("name").map(cell).filter(|_| key != "name");
@@ -277,8 +325,7 @@ fn list_mut<'d>(
 
 /// Checks that the table that the editor saw is still there.
 fn find(tables: &ArrayOfTables, list: &str, index: usize, was: &str) -> Result<(), Unmade> {
-    let name = |table: &Table| table.get("name").map(cell).unwrap_or_default();
-    if tables.get(index).map(name).as_deref() == Some(was) {
+    if tables.get(index).map(name_of).as_deref() == Some(was) {
         return Ok(());
     }
     Err(Unmade::Conflict(format!(

@@ -203,9 +203,15 @@
   function setCell(index, key, was, to, of) {
     if (key === "at") return of ? set(["fieldbus", "at", of], was, to) : refuse("Name the signal first: its place in the device goes by that.");
     const signal = file.sheet?.signals[index];
-    // What is typed next is for the new name.
-    if (key === "name" && signal && (signal.name ?? "") === of) signal.name = to;
-    if (key === "name" && Object.hasOwn(file.sheet?.at ?? {}, of) && to) return rename(index, of, to);
+    if (key === "name" && signal && (signal.name ?? "") === of) {
+      // What is typed next is for the new name, which the place in the device follows.
+      signal.name = to;
+      const { at } = file.sheet;
+      if (to && Object.hasOwn(at, of) && !Object.hasOwn(at, to)) {
+        at[to] = at[of];
+        delete at[of];
+      }
+    }
     return set(["signal", index, key], was, to, of);
   }
 
@@ -214,12 +220,6 @@
     seen = "0";
     await read();
     say(why, true);
-  }
-
-  /** A signal's place in the device follows its name. */
-  async function rename(index, was, to) {
-    const place = file.sheet.at[was];
-    if (await set(["signal", index, "name"], was, to, was) && await set(["fieldbus", "at", was], place, "")) await set(["fieldbus", "at", to], "", place);
   }
 
   async function add(area) {

@@ -526,3 +526,21 @@ fn what_another_program_replaced_at_the_end_is_kept() {
     assert_eq!(fixture.text(), "# theirs\n");
     assert_eq!(fixture.desk.settle(), None, "it is kept once");
 }
+
+#[test]
+fn the_place_in_the_device_follows_the_name_with_its_comment() {
+    let at = "\n[fieldbus.at]\n\"Belt on\"   = \"coil:1\" # K1\n\"Part seen\" = \"input:1\"\n";
+    let mut fixture = Fixture::new(&format!("{FILE}{at}"));
+    let name = || json!(["signal", 0, "name"]);
+    assert_eq!(fixture.edit(set(&name(), "Belt on", "Belt")), Ok(()));
+    let renamed = FILE.replace("\"Belt on\"", "\"Belt\"");
+    let moved = at.replace("\"Belt on\"  ", "Belt       ");
+    assert_eq!(fixture.text(), format!("{renamed}{moved}"));
+    assert_eq!(fixture.desk.undo(), Ok(()), "in one step");
+    assert_eq!(fixture.text(), format!("{FILE}{at}"));
+    // The place of another signal is not taken, and one of two signals with a name leaves it to the other.
+    assert_eq!(fixture.edit(set(&name(), "Belt on", "Part seen")), Ok(()));
+    assert!(fixture.text().ends_with(at), "{}", fixture.text());
+    assert_eq!(fixture.edit(set(&name(), "Part seen", "Third")), Ok(()));
+    assert!(fixture.text().ends_with(at), "{}", fixture.text());
+}

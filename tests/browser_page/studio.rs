@@ -277,6 +277,15 @@ fn what_is_typed_is_kept_and_reaches_no_other_signal() {
     click(&browser, "#remove");
     browser.wait("tickbusStudio.file.sheet.signals.length === 1 && !tickbusStudio.isBusy");
     assert!(!studio.text().contains("%QX0.2"), "{}", studio.text());
+    // Half of a setting is typed when the form is made again.
+    browser.run("const f = document.getElementById('key-driver-name'); f.focus(); f.select();");
+    browser.keys("Half");
+    let moved = studio.text().replace("127.0.0.1:1502", "127.0.0.1:1503");
+    fs::write(studio.file(), &moved).expect("there is room");
+    browser.wait("document.getElementById('key-fieldbus-address').value.endsWith('1503')");
+    assert_eq!(studio.text(), moved);
+    browser.keys(TAB);
+    browser.wait("tickbusStudio.file.sheet.driver.name === 'Half' && !tickbusStudio.isBusy");
 }
 
 /// Why the line did not start is told until the file is another.

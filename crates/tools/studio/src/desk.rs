@@ -168,7 +168,8 @@ impl Desk {
         }
         self.history.add(Arc::clone(&self.text), done);
         self.text = text;
-        self.is_new();
+        self.version += 1;
+        // Which checks it: twice would double the wait for a large file.
         self.save();
     }
 
@@ -199,7 +200,8 @@ impl Desk {
     fn go(&mut self, text: Arc<str>) {
         self.told.clear();
         self.text = text;
-        self.is_new();
+        self.version += 1;
+        // Which checks it: twice would double the wait for a large file.
         self.save();
     }
 
@@ -315,6 +317,9 @@ impl Shapes for Desk {
 /// Says which signals of a text the table does not show.
 fn hidden(text: &str) -> Option<String> {
     let body = text.strip_prefix('\u{feff}').unwrap_or(text);
+    // Most files need not be read for this.
+    let mut lines = body.lines().map(str::trim_start);
+    lines.find(|line| line.starts_with("signal"))?;
     let document = toml_edit::Document::parse(body).ok()?;
     let signals = document.get("signal")?;
     (!signals.is_array_of_tables()).then(|| {

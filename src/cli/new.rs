@@ -138,7 +138,8 @@ fn ask(arguments: &Arguments, kinds: &'static Kinds) -> Result<Answers, Failure>
         (why, Outcome::Usage)
     };
     // One that is there may have another name in the command, such as `.`.
-    let of_folder = fs::canonicalize(&arguments.folder).unwrap_or(arguments.folder.clone());
+    let of_folder =
+        fs::canonicalize(&arguments.folder).unwrap_or_else(|_| arguments.folder.clone());
     let usual = of_folder.file_name().map_or_else(
         || "Machine".into(),
         |name| name.to_string_lossy().into_owned(),

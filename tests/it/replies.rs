@@ -354,3 +354,75 @@ fn the_speed_that_a_simulation_writes_is_that_of_the_drive() {
     line.slots[NIST_A] = Slot::from_real(0.0);
     assert_eq!(line.drives(0x047E, 4), [1]);
 }
+
+/// A client of a Modbus server: %QW0 is holding register 0, %IW0 input register 0.
+#[cfg(unix)]
+struct Plc(std::net::TcpStream);
+
+#[cfg(unix)]
+impl Plc {
+    fn connect(address: &str) -> Self {
+        Self(std::net::TcpStream::connect(address).expect("it listens"))
+    }
+
+    /// Sends STW1, if there is one, and returns ZSW1.
+    fn words(&mut self, stw1: Option<u16>) -> u16 {
+        use std::io::{Read as _, Write as _};
+        let mut ask = |pdu: &[u8]| {
+            let length = u8::try_from(pdu.len()).expect("a short one") + 1;
+            let request = [&[0, 1, 0, 0, 0, length, 1], pdu].concat();
+            self.0.write_all(&request).expect("it is sent");
+            let mut head = [0; 7];
+            self.0.read_exact(&mut head).expect("an answer");
+            let mut answer = vec![0; usize::from(head[5]) - 1];
+            self.0.read_exact(&mut answer).expect("an answer");
+            answer
+        };
+        if let Some(stw1) = stw1 {
+            let [high, low] = stw1.to_be_bytes();
+            // With a setpoint of 100 %.
+            ask(&[16, 0, 0, 0, 2, 4, high, low, 0x40, 0]);
+        }
+        let answer = ask(&[4, 0, 0, 0, 1]);
+        u16::from_be_bytes([answer[2], answer[3]])
+    }
+
+    fn until(&mut self, stw1: u16, state: u16) {
+        while self.words(Some(stw1)) & 0x4F != state {
+            std::thread::yield_now();
+        }
+    }
+}
+
+/// A hosted machine keeps the other words of a PLC that is gone.
+#[cfg(unix)]
+#[test]
+fn a_drive_without_its_plc_makes_a_quick_stop_in_a_hosted_machine_as_well() {
+    use super::commands::Running;
+
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("driver.cfg");
+    let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"modbus-server\"\n\
+                [[drive]]\nname = \"D\"\ntelegram = 1\nramp_up = \"10ms\"\nquick_stop = \"10ms\"\n";
+    fs::write(&file, text).expect("the driver.cfg");
+    let file = file.to_str().expect("a path");
+    let arguments = [file, "--replies", "--address", "127.0.0.1:0"];
+    let mut machine = Running::of("mirror", &arguments);
+    let address = machine.after("mirror: opening: listening on ");
+    let mut plc = Plc::connect(&address);
+    plc.until(0x047E, 0x01);
+    plc.until(0x047F, 0x07);
+    // A fault, S1; the drive may miss a PLC that is back at once.
+    let stopped = (0..20).any(|_| {
+        plc.0
+            .shutdown(std::net::Shutdown::Both)
+            .expect("it is open");
+        machine.after("mirror: opening: the peer left");
+        plc = Plc::connect(&address);
+        (0..100).any(|_| plc.words(None) & 0x4F == 0x48)
+    });
+    assert!(stopped, "it runs on without a PLC");
+    plc.until(0x047E, 0x48);
+    plc.until(0x04FE, 0x01);
+    machine.kill();
+}

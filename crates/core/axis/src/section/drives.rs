@@ -351,7 +351,8 @@ fn signal(drive: &str, word: Word, byte: usize, setup: &Setup) -> Signal {
         unit: scale.map(|_| "1/min".to_owned()),
         latch: None,
         count_swallowed: None,
-        states_fail_safe: false,
+        // A drive without its PLC stops, also where other words keep their last values.
+        states_fail_safe: matches!(word, Word::Stw1),
         hold: Nanos::ZERO,
         fail_safe: Slot::default(),
         dead_band: 0.0,

@@ -104,7 +104,10 @@ impl Track {
             lane.part
                 .take_if(|part| part.front < 0.0 || part.front - size > length);
         }
-        self.enter(io);
+        // A belt that runs backwards takes no part along.
+        if way >= 0.0 {
+            self.enter(io);
+        }
         for sensor in &self.sensors {
             let mut parts = self.lanes.iter().filter_map(|lane| lane.part);
             let on = parts.any(|part| part.is_at(sensor.at, self.size, sensor.span));

@@ -94,6 +94,18 @@ fn a_track_has_as_many_parts_as_places_at_least_a_gap_apart() {
 }
 
 #[test]
+fn no_part_enters_a_track_that_runs_backwards() {
+    let mut machine = Machine::new(&format!(
+        "{TRACK}places = [{{ position = \"i\", height = \"k\" }}]\n"
+    ));
+    machine.set("C", 1.0);
+    assert_eq!(machine.values("i", 4), "0 -10 -10 -10");
+    machine.set("C", 0.0);
+    assert_eq!(machine.values("i", 1), "0");
+    assert_eq!(machine.value("k"), 5.0, "the second part");
+}
+
+#[test]
 fn wrong_integrators_and_tracks_are_refused_at_their_place() {
     let integrator = "[[reply]]\nkind = \"integrator\"\nsignal = \"i\"\n";
     let track = format!("{TRACK}places = [{{ position = \"i\" }}]\n");

@@ -90,7 +90,7 @@ fn prepare_and_run(
         machine.copy_to(to).map_err(failed)?;
         return Ok(print("machine", &copied(machine, to)));
     }
-    let (folder, _removed_at_the_end) = match found {
+    let (folder, unpacked) = match found {
         Found::BuiltIn(machine) => {
             let failed = |error| (error, Outcome::BusFailed);
             let unpacked = Unpacked::new(machine).map_err(failed)?;
@@ -99,7 +99,12 @@ fn prepare_and_run(
         Found::Folder(folder) => (folder, None),
     };
     match &arguments.grade {
-        Some(program) => grade(arguments, &folder, program, kinds),
+        Some(program) => {
+            if let Some(unpacked) = &unpacked {
+                unpacked.leave_when_interrupted();
+            }
+            grade(arguments, &folder, program, kinds)
+        }
         None => Ok(host(arguments, &folder, kinds)),
     }
 }

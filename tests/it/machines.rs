@@ -216,6 +216,33 @@ fn nothing_is_left_among_the_temporary_files() {
     assert_eq!(left, 0, "{}", out(&ran));
 }
 
+#[cfg(unix)]
+#[test]
+fn nor_when_grading_is_interrupted() {
+    use std::io::{BufRead as _, BufReader};
+
+    use rustix::process::{Pid, Signal, kill_process};
+
+    for signal in [Signal::INT, Signal::TERM] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut ran = Command::new(env!("CARGO_BIN_EXE_tickbus"))
+            .args(["machine", "traffic-lights", "--grade", "mirror"])
+            .env("TMPDIR", folder.path())
+            .stdout(std::process::Stdio::piped())
+            .spawn()
+            .expect("the tickbus program runs");
+        let mut output = BufReader::new(ran.stdout.take().expect("it is piped"));
+        let mut first = String::new();
+        output.read_line(&mut first).expect("text");
+        assert!(first.starts_with("FAIL"), "{first}");
+        let pid = i32::try_from(ran.id()).ok().and_then(Pid::from_raw);
+        kill_process(pid.expect("it runs"), signal).expect("it is not waited for yet");
+        ran.wait().expect("it ends");
+        let left = fs::read_dir(folder.path()).expect("the folder").count();
+        assert_eq!(left, 0, "{signal:?}");
+    }
+}
+
 #[test]
 fn wrong_calls_are_refused_with_what_would_be_right() {
     let empty = tempfile::tempdir().expect("a folder");

@@ -9,6 +9,9 @@ use super::shelf::BuiltIn;
 /// The number of names that are tried.
 const ATTEMPTS: u32 = 1000;
 
+/// The exit code after Ctrl-C.
+const INTERRUPTED: i32 = 130;
+
 /// The folder, which nobody else can write to, and which is removed at the end.
 #[derive(Debug)]
 pub(super) struct Unpacked {
@@ -26,6 +29,16 @@ impl Unpacked {
         let unpacked = Self { root, folder };
         machine.copy_to(&unpacked.folder)?;
         Ok(unpacked)
+    }
+
+    /// Removes the folder when this process is interrupted, and ends the process: for work that cannot be stopped otherwise.
+    pub(super) fn leave_when_interrupted(&self) {
+        let root = self.root.clone();
+        // Where signals cannot be caught, the folder stays among other temporary files.
+        let _ = ctrlc::set_handler(move || {
+            let _ = fs::remove_dir_all(&root);
+            std::process::exit(INTERRUPTED);
+        });
     }
 
     /// The folder of the machine.

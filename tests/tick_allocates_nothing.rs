@@ -152,6 +152,66 @@ const REPLIES: &str = "
 [[reply]]\nkind = \"life-sign\"\nsignal = \"I BYTE\"\nevery = \"10ms\"\n
 ";
 
+/// An integrator and a track on signals of their own, and a drive of each kind; what the drives tell comes back as what they
+/// receive.
+const STATES: &str = "
+[[signal]]\nname = \"Level\"\naddress = \"%ID300\"\ntype = \"REAL\"\n
+[[signal]]\nname = \"Gate\"\naddress = \"%IX304.0\"\n
+[[signal]]\nname = \"Gone\"\naddress = \"%IW306\"\ntype = \"INT\"\n
+[[signal]]\nname = \"Part 1\"\naddress = \"%ID308\"\ntype = \"REAL\"\n
+[[signal]]\nname = \"Part 2\"\naddress = \"%ID312\"\ntype = \"REAL\"\n
+[[reply]]\nkind = \"integrator\"\nsignal = \"Level\"\nlimits = [0, 100]\nreset = \"Level > 90\"\n
+flows = [{ rate = 50 }, { when = \"Gate\", input = \"Level\", gain = -0.1 }]\n
+[[reply]]\nkind = \"track\"\nforward = \"not Q bit 0.0\"\nrate = 250\nlength = 1000\nsize = 50\nparts = [80, 40]\n
+sensors = [{ signal = \"Gate\", at = 200, above = 60 }]\nexits = [{ at = 500, when = \"Level >= 0\", signal = \"Gone\" }]\n
+places = [{ position = \"Part 1\" }, { position = \"Part 2\" }]\n
+[[drive]]\nname = \"Servo\"\ntelegram = 5\ncommand_offset = 200\nfeedback_offset = 200\nfault = \"Level > 80\"\n
+[[drive]]\nname = \"Positioner\"\ntelegram = 111\ncommand_offset = 240\nfeedback_offset = 240\nwarning = \"Gate\"\n
+";
+
+/// A PLC would write STW1; here each drive is switched on and off by forcing it.
+#[test]
+fn drives_integrators_and_tracks() {
+    for fieldbus in [FREE, STEPPED] {
+        let config = config(fieldbus, STATES);
+        let of = |name: &str| config.table.position(name).expect("a signal");
+        let words = ["Servo.STW1", "Positioner.STW1"].map(of);
+        let setpoint = of("Servo.NSOLL_B");
+        let seen = ["Part 1", "Gone", "Servo.NIST_B"].map(of);
+        let mut driver = Driver::open(config, Manual::new() as _).expect("opens");
+        let mut watch = driver.watch();
+        let mut slots = driver.initial_slots();
+        let held = watch.force(setpoint, Slot::from_real(300.0));
+        held.expect("there is room");
+        let (mut count, mut most, mut forced) = (0, [0.0_f64; 3], None);
+        for tick in 0..5_000_i64 {
+            watch.ask(true);
+            if tick % 50 == 0 {
+                let stw1 = if tick % 500 == 0 { 0x047E } else { 0x047F };
+                let now = words.map(|word| {
+                    let id = watch.force(word, Slot::from_real(f64::from(stw1)));
+                    id.expect("there is room")
+                });
+                for id in forced.replace(now).into_iter().flatten() {
+                    watch.end_fault(id).expect("it is taken");
+                }
+            }
+            let before = allocations_of_thread();
+            driver.exchange(Nanos::from_millis(tick), &mut slots);
+            if tick >= 100 {
+                count += allocations_of_thread() - before;
+                for (most, signal) in most.iter_mut().zip(seen) {
+                    *most = most.max(slots[signal].real());
+                }
+            }
+            assert!(watch.update(), "a copy came with its tick");
+        }
+        assert_eq!(count, 0, "{fieldbus}");
+        let [part, gone, speed] = most;
+        assert!(part > 400.0 && gone > 0.0 && speed > 50.0, "{most:?}");
+    }
+}
+
 /// The simulation overrules one of the replies in the middle of the run.
 #[test]
 fn a_driver_with_replies() {

@@ -97,7 +97,12 @@ impl Exposed {
         }
         let arrays = match version {
             Version::Two => Vec::new(),
-            Version::Three => arrays_of(table, &cells, &variables),
+            Version::Three => {
+                let counted = table.signals.iter().zip(&map.edges);
+                let counted = counted.filter(|(_, slot)| slot.is_some());
+                let edges: Vec<String> = counted.map(|(signal, _)| edges_of(signal)).collect();
+                arrays_of(table, &cells, &variables, &edges)
+            }
         };
         for (index, array) in arrays.iter().enumerate() {
             for (at, slot) in array.slots.iter().enumerate() {
@@ -155,7 +160,7 @@ impl Exposed {
                 "edges follow in the order of the signals"
             );
             variables.push(Variable {
-                name: format!("{}.edges", signal.name),
+                name: edges_of(signal),
                 reference: Place::Slot(*slot).reference(),
                 value_type: edges.value_type,
                 enumeration: None,
@@ -191,11 +196,22 @@ impl Exposed {
     }
 }
 
-/// Returns the arrays among the signals. Their elements have the same type, direction, unit and station.
-fn arrays_of(table: &SignalTable, cells: &[Cell], own: &[Variable]) -> Vec<Array> {
+/// Returns the name of the variable that counts the edges of a signal.
+fn edges_of(signal: &Signal) -> String {
+    format!("{}.edges", signal.name)
+}
+
+/// Returns the arrays among the signals; none has a name of `own` variables or of those that count `edges`. Their elements have the same type, direction, unit and station.
+fn arrays_of(
+    table: &SignalTable,
+    cells: &[Cell],
+    own: &[Variable],
+    edges: &[String],
+) -> Vec<Array> {
     let names = table.signals.iter().map(|signal| signal.name.as_str());
     let taken: BTreeSet<&str> = names
         .chain(own.iter().map(|variable| variable.name.as_str()))
+        .chain(edges.iter().map(String::as_str))
         .collect();
     let signals = table.signals.iter().zip(cells).map(|(signal, cell)| {
         let kind = (cell.value_type, cell.is_input, &signal.unit, signal.station);

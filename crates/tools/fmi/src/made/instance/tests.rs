@@ -204,6 +204,18 @@ fn no_step_goes_beyond_the_stop_time() {
 }
 
 #[test]
+fn an_array_has_not_the_name_of_a_count_of_edges() {
+    let text = format!(
+        "{TEXT}[[signal]]\nname = \"go\"\naddress = \"%QX8.0\"\nlatch = \"both\"\n\
+         [[signal]]\nname = \"go.edges[1]\"\naddress = \"%QW10\"\n[[signal]]\nname = \"go.edges[2]\"\naddress = \"%QW12\"\n"
+    );
+    let (_folder, it) = instance_of(&text, Version::Three, EventMode::Unused);
+    let names = it.exposed.variables.iter().map(|one| one.name.as_str());
+    let names: Vec<&str> = names.filter(|name| name.starts_with("go")).collect();
+    assert_eq!(names, ["go", "go.edges[1]", "go.edges[2]", "go.edges"]);
+}
+
+#[test]
 fn an_array_is_set_and_got_as_a_whole() {
     let (_folder, mut it) = begun(Version::Three, EventMode::Unused);
     let [x, y] = ["x", "y"].map(|name| reference(&it, name));

@@ -109,6 +109,31 @@ fn a_network_in_which_nobody_answers_takes_less_than_five_seconds_and_one_packet
     assert_eq!(output.status.code(), Some(3));
 }
 
+/// Addresses that accept connections and say nothing take files for a while.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_process_that_may_have_few_files_open_finds_the_same() {
+    let port = free_port();
+    let mut held = Vec::new();
+    for last in 1..=60 {
+        held.push(TcpListener::bind(format!("127.20.8.{last}:{port}")).expect("a port"));
+    }
+    Cpu::default().serve_at(&format!("127.20.8.61:{port}"));
+    let few = "ulimit -n 64; exec \"$0\" find --bus s7 \"$1\"";
+    let output = Command::new("sh")
+        .args(["-c", few, env!("CARGO_BIN_EXE_tickbus")])
+        .arg(format!("127.20.8.1-61:{port}"))
+        .output()
+        .expect("the tickbus program runs");
+    let told = String::from_utf8_lossy(&output.stdout);
+    assert!(
+        told.contains("find: devices=1 tried=61 refused=0 silent=0 unreachable=0"),
+        "{told}{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    assert!(told.contains("50 more ports accept connections"), "{told}");
+}
+
 fn at_of(last: u8, port: &str) -> String {
     format!("127.20.7.{last}:{port}")
 }

@@ -223,6 +223,9 @@ fn asyncua() -> Result<(), Absent> {
     );
     let denied = signal("ns=2;s=torque", "torque", "REAL").replace("%QW0", "%QD0");
     examine(&line, &denied, "access-denied", "the right to read");
+    // What the driver only writes need not be readable.
+    let written = denied.replace("%QD0", "%ID0");
+    examine(&line, &written, "ok", "if the driver reads them");
     let secured = line.replace("\"None\"", "\"Basic256Sha256\"");
     examine(
         &secured,

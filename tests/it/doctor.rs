@@ -1,5 +1,6 @@
 //! `tickbus doctor` names the true cause of prepared faults.
 
+mod dying;
 pub(crate) mod peers;
 
 use std::net::SocketAddr;

@@ -293,7 +293,7 @@ impl Cpu {
         })
     }
 
-    fn talk(mut self, mut stream: TcpStream) -> Option<()> {
+    pub(crate) fn talk(mut self, mut stream: TcpStream) -> Option<()> {
         let facts = Facts {
             identity: Identity::of_driver("Press"),
             pdu: 480,

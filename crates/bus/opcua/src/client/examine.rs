@@ -23,8 +23,11 @@ use tickbus_fieldbus::examine::{Examination, Peer, Round};
 /// The time for a server to answer a question; with certificates it computes for a while.
 const PATIENCE: Nanos = Nanos::from_secs(10);
 
-/// The most signals that are read one by one.
+/// The most signals that are read one by one, besides those that have to change.
 const SINGLES: usize = 500;
+
+/// The most nodes of one request while values are watched: small servers refuse more.
+const TOGETHER: usize = 100;
 
 /// Where a conversation with a server stands.
 struct Line<'a> {
@@ -78,8 +81,10 @@ pub(crate) fn examine(options: &ClientOptions, examination: &mut Examination<'_>
     examination.sizes("the server reports changes");
     if let Ok(fields) = fields(options, &examination.setup) {
         let nodes = addresses(&line, examination, (&session, &server), &fields);
-        run_state(&line, examination, &session);
-        if !nodes.is_empty() {
+        if let Some(nodes) = nodes
+            && run_state(&line, examination, &session)
+            && !nodes.is_empty()
+        {
             examination.watch_values(|| round(&line, &session, &nodes, fields.len()));
         }
     }
@@ -265,27 +270,43 @@ struct Trouble {
     what: String,
 }
 
-/// The step `addresses`; returns the nodes that can be read, with the positions of their signals.
+/// The step `addresses`; returns the nodes that can be read, with the positions of their signals. `None` if the server has
+/// fallen silent.
 fn addresses(
     line: &Line<'_>,
     examination: &mut Examination<'_>,
     (session, server): (&Session, &Server),
     fields: &[Field],
-) -> Vec<(usize, NodeId)> {
+) -> Option<Vec<(usize, NodeId)>> {
     let mut good = Vec::new();
     let mut troubles = Vec::new();
-    for (signal, field) in fields.iter().enumerate().take(SINGLES) {
+    let watched: Vec<usize> = examination.watched.iter().map(|(of, _)| *of).collect();
+    for (signal, field) in fields.iter().enumerate() {
+        if signal >= SINGLES && !watched.contains(&signal) {
+            continue;
+        }
         match look(line, (session, server), field) {
             Ok(node) => good.push((signal, node)),
+            Err(lost) if lost.cause == "connection-lost" => {
+                // The others would be asked in vain, each with a time-out.
+                let next = "see whether the server restarts, or closes connections, and its log";
+                examination.fail("addresses", lost.cause, lost.what, next);
+                return None;
+            }
             Err(trouble) => troubles.push(trouble),
         }
     }
     let Some(first) = troubles.first() else {
-        examination.ok(
-            "addresses",
-            "all nodes exist, have the right type, and can be read",
+        let rest = if fields.len() > SINGLES {
+            format!("; the first {SINGLES} were read one by one")
+        } else {
+            String::new()
+        };
+        let told = format!(
+            "all nodes exist, have the right type, and can be read if the driver reads them{rest}"
         );
-        return good;
+        examination.ok("addresses", told);
+        return Some(good);
     };
     let next = match first.cause {
         "namespace-unknown" | "wrong-namespace" => {
@@ -309,7 +330,7 @@ fn addresses(
     examination
         .fail("addresses", first.cause, evidence, next)
         .details = details;
-    good
+    Some(good)
 }
 
 /// Reads one signal's node.
@@ -332,13 +353,15 @@ fn look(
     };
     let judged = nodes::judge(field, &values, false).err();
     let may_read = !matches!(access.value, Some(Variant::Byte(access)) if access & READS == 0);
-    let is_denied = [value.status(), kind.status()].iter().any(|status| {
+    let is_denied = |status: StatusCode| {
         matches!(
-            *status,
+            status,
             StatusCode::BadUserAccessDenied | StatusCode::BadNotReadable
         )
-    });
-    let cause = if is_denied || (!may_read && !kind.status().is_bad()) {
+    };
+    let cannot_read = is_denied(value.status()) || (!may_read && !kind.status().is_bad());
+    // A node may be for writing only; the driver then does not read it either.
+    let cause = if is_denied(kind.status()) || (field.is_read && cannot_read) {
         "access-denied"
     } else if kind.status().is_bad() {
         missing(line, (session, server), &node)
@@ -405,16 +428,24 @@ fn elsewhere(
     found.map(|(other, _)| *other)
 }
 
-/// The step `run`.
-fn run_state(line: &Line<'_>, examination: &mut Examination<'_>, session: &Session) {
+/// The step `run`. False if the server does not answer.
+fn run_state(line: &Line<'_>, examination: &mut Examination<'_>, session: &Session) -> bool {
     let wanted = [ReadValueId::new_value(
         VariableId::Server_ServerStatus_State.into(),
     )];
     let read = line
         .drive(nodes::read(session, &wanted))
         .and_then(Result::ok);
-    let value = read.and_then(|values| values.into_iter().next());
-    match value.as_ref().and_then(state) {
+    let Some(value) = read.and_then(|values| values.into_iter().next()) else {
+        examination.fail(
+            "run",
+            "connection-lost",
+            "the server does not answer when it is asked whether it runs",
+            "see whether the server restarts, or closes connections, and its log",
+        );
+        return false;
+    };
+    match state(&value) {
         Some(PlcState::Stop) => {
             examination.fail(
                 "run",
@@ -423,10 +454,16 @@ fn run_state(line: &Line<'_>, examination: &mut Examination<'_>, session: &Sessi
                 "switch the PLC to RUN",
             );
         }
-        _ => {
+        Some(PlcState::Run) if !value.status().is_bad() => {
             examination.ok("run", "the server says that it runs");
         }
+        _ => {
+            let step = examination.ok("run", "the server does not say whether it runs");
+            "name a signal that has to change: alive = { signal = \"...\", within = \"500ms\" }"
+                .clone_into(&mut step.next);
+        }
     }
+    true
 }
 
 fn round(
@@ -440,7 +477,10 @@ fn round(
         .iter()
         .map(|(_, node)| ReadValueId::new_value(node.clone()));
     let wanted: Vec<ReadValueId> = wanted.collect();
-    let read = line.drive(nodes::read(session, &wanted))?.ok()?;
+    let mut read = Vec::new();
+    for wanted in wanted.chunks(TOGETHER) {
+        read.extend(line.drive(nodes::read(session, wanted))?.ok()?);
+    }
     let mut values = vec![Vec::new(); signals];
     for ((signal, _), value) in nodes.iter().zip(read) {
         values[*signal] = format!("{:?}", value.value).into_bytes();

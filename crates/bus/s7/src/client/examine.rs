@@ -18,6 +18,9 @@ pub(super) use talk::{Miss, SLOTS, Talk, meets};
 /// How far the neighbours of a number lie, in bytes: a WORD.
 const STEP: usize = 2;
 
+/// How often a CPU is tried that has just served a connection: it may need a while to give it free.
+const AGAIN: usize = 3;
+
 /// The fields of an examination: each signal's own bytes, and those before and behind it, each in a frame of its own, so
 /// that a refusal is known for each of them. Nothing is written.
 fn each(options: &ClientOptions, table: &SignalTable) -> FrameFields {
@@ -99,14 +102,27 @@ impl ClientOptions {
         state(examination, &mut talk);
         self.second_client(examination, &peer);
         talk.hang_up();
-        let Ok(wire) = peer.dial() else {
-            return;
-        };
         let whole = self.everything(table);
-        let mut talk = Talk::new(wire, &peer, &whole, ends, self.pdu, false);
-        if talk.meet().is_ok() {
-            examination.watch_values(|| round(&mut talk, table));
+        for again in 0..AGAIN {
+            if again > 0 {
+                let clock = peer.clock();
+                clock.wait_until(peer.now() + peer.patience(), examination.stop);
+            }
+            let Ok(wire) = peer.dial() else {
+                continue;
+            };
+            let mut talk = Talk::new(wire, &peer, &whole, ends, self.pdu, false);
+            if talk.meet().is_ok() {
+                return examination.watch_values(|| round(&mut talk, table));
+            }
+            talk.hang_up();
         }
+        examination.fail(
+            "age",
+            "connection-lost",
+            format!("{} does not accept another connection", peer.address),
+            "see whether the CPU restarts, and whether other clients take its connections",
+        );
     }
 
     /// The fields that the driver reads and writes, all of them to be read.

@@ -355,6 +355,44 @@ fn the_speed_that_a_simulation_writes_is_that_of_the_drive() {
     assert_eq!(line.drives(0x047E, 4), [1]);
 }
 
+/// What a PLC would write is forced.
+#[test]
+fn a_drive_may_fail_by_its_own_speed_and_warn_by_a_reply_that_reads_it() {
+    let (mut driver, mut slots) = open(
+        "[fieldbus]\nkind = \"loopback\"\nprogram = \"mirror\"\n\
+         [[signal]]\nname = \"Fast\"\naddress = \"%IX9.0\"\n\
+         [[drive]]\nname = \"D\"\ntelegram = 1\nramp_up = \"1s\"\nfault = \"D.NIST_A > 1000\"\nwarning = \"Fast\"\n\
+         [[reply]]\nkind = \"follows\"\nsignal = \"Fast\"\nwhen = \"D.NIST_A > 500\"\n",
+    );
+    let names = ["D.STW1", "D.NSOLL_A", "D.ZSW1", "D.NIST_A"];
+    let names = names.map(|name| driver.config().table.position(name).expect("a signal"));
+    let [stw1, setpoint, zsw1, speed] = names;
+    let mut watch = driver.watch();
+    for (signal, value) in [(setpoint, 3000.0), (stw1, f64::from(0x047E))] {
+        let id = watch.force(signal, Slot::from_real(value));
+        id.expect("there is room");
+    }
+    let mut seen = Vec::new();
+    for tick in 0..600 {
+        if tick == 10 {
+            let id = watch.force(stw1, Slot::from_real(f64::from(0x047F)));
+            id.expect("there is room");
+        }
+        driver.exchange(Nanos::from_millis(tick), &mut slots);
+        seen.push((slots[zsw1].real(), slots[speed].real()));
+    }
+    let has = |value: f64, bit: u32| (value / f64::from(bit)).floor() % 2.0 > 0.5;
+    let first = |bit| {
+        seen.iter()
+            .find(|(zsw1, _)| has(*zsw1, bit))
+            .expect("it comes")
+            .1
+    };
+    let (warned, failed) = (first(0x80), first(0x08));
+    assert!((500.0..520.0).contains(&warned), "{warned}");
+    assert!((980.0..1020.0).contains(&failed), "{failed}");
+}
+
 /// A client of a Modbus server: %QW0 is holding register 0, %IW0 input register 0.
 #[cfg(unix)]
 struct Plc(std::net::TcpStream);

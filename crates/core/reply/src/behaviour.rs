@@ -22,10 +22,13 @@ use super::travel::Travel;
 /// The kind whose replies are rules.
 pub(crate) const RULE: &str = "rule";
 
+/// The beginning of the kinds of drives, before the telegram.
+pub(crate) const DRIVE: &str = "drive";
+
 /// True for kinds whose replies may read what they make, because they read the values of the tick before: states that change
 /// with time.
 pub(crate) fn reads_tick_before(kind: &str) -> bool {
-    matches!(kind, RULE | "integrator" | "track")
+    matches!(kind, RULE | "integrator" | "track") || kind.starts_with(DRIVE)
 }
 
 /// One `[[reply]]` or `[[drive]]` of a driver.cfg, or `[[machine.reply]]` of a test file, at its beginning.

@@ -24,8 +24,8 @@ pub struct Replies {
     pub(crate) awake: Awake,
     /// By index of the signal.
     made: Box<[Made]>,
-    /// The signals of replies that rules, integrators and tracks read or make: they have them at the beginning of a tick, whatever a simulation
-    /// that does not write them has handed over.
+    /// The signals of replies that rules, integrators, tracks and drives read or make: they have them at the beginning of a
+    /// tick, whatever a simulation that does not write them has handed over.
     kept: Box<[usize]>,
     board: Arc<FaultBoard>,
     /// The shortest time that a reply states, and the place of the note about longer ticks; `None` once it is marked.

@@ -386,10 +386,19 @@ fn integrator(reader: &Reader<'_>) -> Option<Behaviour> {
 /// The heights that a sensor or an exit of a track is for.
 fn span(reader: &Reader<'_>) -> Option<Span> {
     let [above, below] = ["above", "below"].map(|key| reader.number(key));
-    Some(Span {
+    let span = Span {
         above: above?.unwrap_or(f64::NEG_INFINITY),
         below: below?.unwrap_or(f64::INFINITY),
-    })
+    };
+    if span.above > span.below {
+        let [above, below] = [span.above, span.below].map(short_number);
+        return reader.wrong(
+            "below",
+            format!("no height is above {above} and below {below}"),
+            "write the lower height with \"above\"",
+        );
+    }
+    Some(span)
 }
 
 fn track(reader: &Reader<'_>) -> Option<Behaviour> {

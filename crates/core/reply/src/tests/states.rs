@@ -141,6 +141,10 @@ fn wrong_integrators_and_tracks_are_refused_at_their_place() {
             "\"a\" is made by the reply on line 10, too",
         ),
         (
+            format!("{track}exits = [{{ at = 1, above = 5, below = 3 }}]"),
+            "x:10:39: no height is above 5 and below 3; write the lower height with \"above\"",
+        ),
+        (
             format!("{track}exits = [{{ at = 1, signal = \"a\" }}]"),
             "x:10:29: \"a\" is a BOOL, and no number",
         ),

@@ -1,6 +1,6 @@
 //! The targets of a search: addresses, ranges and names that the user writes.
 
-use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 use std::str::FromStr;
 
 use tickbus_base::Mistake;
@@ -24,6 +24,10 @@ impl FromStr for Target {
     type Err = Mistake;
 
     fn from_str(text: &str) -> Result<Self, Mistake> {
+        // Without a port behind it IPv6 needs no brackets.
+        if let Ok(ip) = text.parse::<Ipv6Addr>() {
+            return Ok(Self::Host(Host::Ip(ip.into()), None));
+        }
         if let Some((network, bits)) = text.split_once('/') {
             return network_of(network, bits)
                 .ok_or_else(|| wrong(text))
@@ -160,6 +164,7 @@ mod tests {
         assert_eq!(all("10.0.0.7:1502"), ["10.0.0.7:1502"]);
         assert_eq!(all("[::1]:7"), ["[::1]:7"]);
         assert_eq!(all("[::1]"), ["[::1]:502", "[::1]:102"]);
+        assert_eq!(all("::1"), ["[::1]:502", "[::1]:102"]);
         assert_eq!(all("10.0.0.5-6:7"), ["10.0.0.5:7", "10.0.0.6:7"]);
         assert_eq!(all("10.0.0.255-10.0.1.0:7").len(), 2);
         assert_eq!(all("192.168.0.0/24").len(), 2 * 254);

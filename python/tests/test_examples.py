@@ -125,10 +125,9 @@ def test_the_machine_that_tickbus_new_writes_meets_its_plc(tmp_path: Path) -> No
         pytest.skip("there is no target/release/tickbus")
     new = [command, "new", tmp_path / "m", "--plc", "none", "--simulator", "python"]
     subprocess.run(new, check=True, stdout=subprocess.DEVNULL)
-    machine = subprocess.Popen([sys.executable, "machine.py"], cwd=tmp_path / "m", stdout=subprocess.PIPE, text=True)
-    try:
-        assert machine.stdout is not None
-        assert any("valve True" in line for line in machine.stdout)
-    finally:
-        machine.kill()
-        machine.wait()
+    with subprocess.Popen([sys.executable, "machine.py"], cwd=tmp_path / "m", stdout=subprocess.PIPE, text=True) as machine:
+        try:
+            assert machine.stdout is not None
+            assert any("valve True" in line for line in machine.stdout)
+        finally:
+            machine.kill()

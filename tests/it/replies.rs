@@ -355,7 +355,7 @@ fn the_speed_that_a_simulation_writes_is_that_of_the_drive() {
     assert_eq!(line.drives(0x047E, 4), [1]);
 }
 
-/// What a PLC would write is forced.
+/// The outputs of a PLC are forced.
 #[test]
 fn a_drive_may_fail_by_its_own_speed_and_warn_by_a_reply_that_reads_it() {
     let (mut driver, mut slots) = open(

@@ -34,7 +34,7 @@ fn an_opcua_server_that_falls_silent_in_the_middle_is_not_asked_for_each_signal(
 
     let folder = tempfile::tempdir().expect("a folder");
     let own = closed();
-    let signals: String = (0..300)
+    let signals: Vec<String> = (0..300)
         .map(|at| {
             format!(
                 "[[signal]]\nname = \"s{at}\"\naddress = \"%QW{}\"\n",
@@ -42,6 +42,7 @@ fn an_opcua_server_that_falls_silent_in_the_middle_is_not_asked_for_each_signal(
             )
         })
         .collect();
+    let signals = signals.concat();
     let served = folder.path().join("served.cfg");
     let text = super::file(
         &format!(

@@ -89,7 +89,7 @@ pub trait BusOptions: AnyOptions {
         None
     }
 
-    /// The addition to [`summary`](Self::summary) if each [write](Events::Writes) of the peer is an event.
+    /// The addition to [`summary`](Self::summary) if each [write](crate::Events::Writes) of the peer is an event.
     fn summary_of_writes(&self) -> Option<&'static str> {
         None
     }
@@ -199,7 +199,7 @@ pub trait BusKind: BusOptions + Sized {
     const NAME: &'static str;
 
     /// True if the bus learns of each write of its peer, so that a driver.cfg can request [writes as
-    /// events](Events::Writes).
+    /// events](crate::Events::Writes).
     const LEARNS_OF_WRITES: bool = false;
 
     /// True if an end of this bus can be an [observer](Role::Observer): it then places a signal by its [address in the

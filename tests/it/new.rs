@@ -4,6 +4,7 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
+#[cfg(target_os = "linux")]
 use crate::c_api::library;
 
 const PLCS: [&str; 9] = [

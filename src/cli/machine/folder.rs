@@ -57,6 +57,7 @@ impl Drop for Unpacked {
 /// Makes a new folder among the temporary files.
 fn private_folder() -> Result<PathBuf, String> {
     let parent = std::env::temp_dir();
+    #[cfg_attr(not(unix), expect(unused_mut, reason = "only Unix has a mode to set"))]
     let mut builder = fs::DirBuilder::new();
     #[cfg(unix)]
     std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);

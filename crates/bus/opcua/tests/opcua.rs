@@ -219,10 +219,7 @@ fn a_second_writer_is_counted_or_refused_until_the_first_one_has_left() {
 /// Lines of `[fieldbus.at]` that name no member of the variables in tests/peers/axes.NodeSet2.xml.
 #[test]
 fn a_line_that_names_no_single_value_is_a_mistake() {
-    let model = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../../../tests/peers/axes.NodeSet2.xml"
-    );
+    let model = include_str!("../../../../tests/peers/axes.NodeSet2.xml");
     for (places, part) in [
         (&["6005.Points[2].X"][..], "the last element is [1]"),
         (&["6005.Points[0].Z"], "the members are X, Y"),
@@ -249,13 +246,14 @@ fn a_line_that_names_no_single_value_is_a_mistake() {
         });
         let text = format!(
             "[driver]\nid = 1\nname = \"axes\"\n[fieldbus]\nkind = \"opcua-server\"\naddress = \"127.0.0.1:0\"\n\
-             security = \"None\"\nanonymous = true\nnodeset = {model:?}\n[fieldbus.at]\n{}{}",
+             security = \"None\"\nanonymous = true\nnodeset = \"axes.NodeSet2.xml\"\n[fieldbus.at]\n{}{}",
             lines.collect::<String>(),
             signals.collect::<String>()
         );
         let folder = tempfile::tempdir().expect("a folder");
         let file = folder.path().join("driver.cfg");
         std::fs::write(&file, text).expect("it is written");
+        std::fs::write(folder.path().join("axes.NodeSet2.xml"), model).expect("it is written");
         let told = Config::load(&file, &KINDS).expect_err("a mistake");
         let told = told.to_string();
         assert!(told.contains(part), "{places:?}: {told}");

@@ -23,6 +23,8 @@ mod java;
 #[cfg(target_os = "linux")]
 mod libmodbus;
 mod machines;
+#[cfg(feature = "page")]
+mod metrics;
 mod modbus;
 mod modbus_functions;
 mod modbus_lines;
@@ -82,6 +84,8 @@ fn main() -> ExitCode {
         ("bridge_bus", bridge_bus::TESTS),
         #[cfg(feature = "page")]
         ("page", page::TESTS),
+        #[cfg(feature = "page")]
+        ("metrics", metrics::TESTS),
         ("gateway", gateway::TESTS),
         ("helics", helics::TESTS),
         ("silkit", silkit::TESTS),

@@ -1,10 +1,8 @@
-//! The live page with foreign programs: mbpoll reads forced values over Modbus, and the parser of `prometheus_client`
-//! reads the metrics.
+//! The live page with a foreign program: mbpoll reads forced values over Modbus.
 #![allow(missing_docs, reason = "a test")]
 
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
-use std::process::Stdio;
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -17,7 +15,6 @@ pub(crate) const TESTS: &[(&str, Test)] = &[
         "what_is_forced_for_nobody_is_released_after_the_grace_time",
         forced_for_nobody,
     ),
-    ("prometheus_client_reads_the_metrics", metrics),
     ("a_killed_plc_is_told_with_its_reason", killed_plc),
 ];
 
@@ -38,17 +35,17 @@ scale = { raw = [0, 27648], value = [0.0, 250.0] }
 "#;
 
 /// A machine that mirrors every %Q byte, with a page.
-struct Machine {
-    command: Running,
-    page: String,
+pub(super) struct Machine {
+    pub(super) command: Running,
+    pub(super) page: String,
     token: String,
     /// The port of its bus.
-    port: String,
+    pub(super) port: String,
     _folder: tempfile::TempDir,
 }
 
 impl Machine {
-    fn start(fieldbus: &str, page: &str) -> Self {
+    pub(super) fn start(fieldbus: &str, page: &str) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let file = folder.path().join("driver.cfg");
         let text = format!(
@@ -70,7 +67,7 @@ impl Machine {
     }
 
     /// Sends a request with the token; returns the body of the answer.
-    fn ask(&self, line: &str, body: &str) -> String {
+    pub(super) fn ask(&self, line: &str, body: &str) -> String {
         let mut stream = TcpStream::connect(&self.page).expect("it listens");
         let (page, token, length) = (&self.page, &self.token, body.len());
         write!(
@@ -90,7 +87,7 @@ impl Machine {
     }
 
     /// The entry of one signal in `/signals`.
-    fn signal(&self, index: usize) -> serde_json::Value {
+    pub(super) fn signal(&self, index: usize) -> serde_json::Value {
         self.get("/signals")["drivers"][0]["signals"][index].take()
     }
 
@@ -119,7 +116,7 @@ impl Machine {
 
 /// Waits until the condition holds.
 #[track_caller]
-fn eventually(what: &str, mut is_so: impl FnMut() -> bool) {
+pub(super) fn eventually(what: &str, mut is_so: impl FnMut() -> bool) {
     let limit = Instant::now() + Duration::from_secs(20);
     while !is_so() {
         assert!(Instant::now() < limit, "{what}");
@@ -128,7 +125,7 @@ fn eventually(what: &str, mut is_so: impl FnMut() -> bool) {
 }
 
 /// Half of 250 mm is 13824 raw.
-const LEVEL: &str = "/force/4711/Level%20%22left%22";
+pub(super) const LEVEL: &str = "/force/4711/Level%20%22left%22";
 
 fn mbpoll_reads_what_is_forced() -> Result<(), Absent> {
     harness::command("mbpoll", "mbpoll")?;
@@ -201,42 +198,6 @@ fn forced_for_nobody() -> Result<(), Absent> {
     machine.await_register("3", "2", "13824")?;
     drop(viewer);
     machine.await_register("3", "2", "0")
-}
-
-fn metrics() -> Result<(), Absent> {
-    let mut python = harness::python_with("metrics", &["prometheus_client"])?;
-    let machine = Machine::start("kind = \"modbus-server\"", "keep_forced = true");
-    machine.ask(&format!("PUT {LEVEL}"), "125.0");
-    eventually("it is forced", || machine.signal(2)["value"] == 125);
-    // The statistics are updated twice a second.
-    let mut text = String::new();
-    eventually("the statistics tell of it", || {
-        text = machine.ask("GET /metrics", "");
-        let mut lines = text.lines();
-        lines.any(|line| line.contains("key=\"fault.begun\"") && line.ends_with(" 1"))
-    });
-    let mut reader = python
-        .arg("tests/peers/read_metrics.py")
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()
-        .expect("Python runs");
-    let mut stdin = reader.stdin.take().expect("it is piped");
-    stdin.write_all(text.as_bytes()).expect("it reads");
-    drop(stdin);
-    let output = reader.wait_with_output().expect("it ends");
-    assert!(output.status.success(), "it cannot be read:\n{text}");
-    let read = String::from_utf8(output.stdout).expect("UTF-8");
-    let has = |line: &str| assert!(read.lines().any(|it| it == line), "no {line:?} in\n{read}");
-    let level = "driver=Tank id=4711 signal=Level \"left\"";
-    has(&format!(
-        "gauge\ttickbus_signal_value\t{level} unit=mm\t125"
-    ));
-    has(&format!("gauge\ttickbus_signal_forced\t{level}\t1"));
-    has("counter\ttickbus_signal_edges_total\tdriver=Tank id=4711 signal=Valve\t0");
-    has("stateset\ttickbus_line_state\tdriver=Tank id=4711 tickbus_line_state=opening\t1");
-    has("gauge\ttickbus_statistic\tdriver=Tank id=4711 key=fault.begun\t1");
-    Ok(())
 }
 
 #[expect(clippy::unnecessary_wraps, reason = "as all tests here")]

@@ -1,8 +1,8 @@
-"""Reads OpenMetrics from stdin with prometheus_client's parser, and prints a line per sample."""
+"""Reads Prometheus' text format from stdin with prometheus_client's parser, and prints a line per sample."""
 
 import sys
 
-from prometheus_client.openmetrics.parser import text_string_to_metric_families
+from prometheus_client.parser import text_string_to_metric_families
 
 for family in text_string_to_metric_families(sys.stdin.read()):
     for sample in family.samples:

@@ -79,42 +79,96 @@ impl fmt::Display for Value {
     }
 }
 
+/// A distribution of times, for programs that add up distributions themselves.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Distribution {
+    /// The key before the dots of its entries.
+    pub key: String,
+    /// How many times are at most as long as each of [`BOUNDS`](Self::BOUNDS), to the histogram's resolution of 1 %.
+    pub up_to: [u64; Self::BOUNDS.len()],
+    /// How many times there are.
+    pub count: u64,
+    /// Their sum in seconds.
+    pub sum: f64,
+}
+
+impl Distribution {
+    /// Three bounds for each power of ten: from a tick of a small image to a PLC that has gone for long.
+    pub const BOUNDS: [Nanos; 22] = {
+        let mut bounds = [Nanos(10_000_000_000); 22];
+        let (mut at, mut power) = (0, 1_000);
+        while at < 21 {
+            bounds[at] = Nanos(power);
+            bounds[at + 1] = Nanos(power / 2 * 5);
+            bounds[at + 2] = Nanos(power * 5);
+            (at, power) = (at + 3, power * 10);
+        }
+        bounds
+    };
+
+    fn new(key: &str, of: &TimeHistogram) -> Self {
+        let mut up_to = [0; Self::BOUNDS.len()];
+        for (longest, count) in of.steps() {
+            let first = Self::BOUNDS.partition_point(|bound| *bound < longest);
+            for sum in &mut up_to[first..] {
+                *sum += count;
+            }
+        }
+        Self {
+            key: key.to_owned(),
+            up_to,
+            count: of.count(),
+            sum: of.sum() / 1e9,
+        }
+    }
+}
+
 /// Statistics at one moment, in the order for printing.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Statistics(Vec<(Key, Value)>);
+pub struct Statistics {
+    entries: Vec<(Key, Value)>,
+    distributions: Vec<Distribution>,
+}
 
 impl Statistics {
     /// The entries in their order.
     pub fn iter(&self) -> impl Iterator<Item = (&str, &Value)> {
-        self.0.iter().map(|(key, value)| (&*key.0, value))
+        self.entries.iter().map(|(key, value)| (&*key.0, value))
+    }
+
+    /// The distributions of times, whose [entries](Self::iter) have their quantiles.
+    pub fn distributions(&self) -> &[Distribution] {
+        &self.distributions
     }
 
     /// Adds a count.
     pub fn count(&mut self, key: impl Into<Key>, count: u64) {
-        self.0.push((key.into(), Value::Count(count)));
+        self.entries.push((key.into(), Value::Count(count)));
     }
 
     /// Adds a number, shown with this many decimal places.
     pub fn number(&mut self, key: impl Into<Key>, number: f64, digits: usize) {
-        self.0.push((key.into(), Value::Number(number, digits)));
+        self.entries
+            .push((key.into(), Value::Number(number, digits)));
     }
 
     /// Adds a time.
     pub fn time(&mut self, key: impl Into<Key>, time: Nanos) {
-        self.0.push((key.into(), Value::Time(time)));
+        self.entries.push((key.into(), Value::Time(time)));
     }
 
     /// Adds text; characters that would end the line are replaced by a space.
     pub fn text(&mut self, key: impl Into<Key>, text: &str) {
         let ends_line = |c: char| c.is_control() || matches!(c, '\u{2028}' | '\u{2029}');
         let text = text.replace(ends_line, " ");
-        self.0.push((key.into(), Value::Text(text)));
+        self.entries.push((key.into(), Value::Text(text)));
     }
 
     /// Adds `key.count` and, unless it is zero, `key.p50_us`, `p90`, `p99`, `max`, `mean`, `min` and `stdev`, in
     /// microseconds.
     pub fn distribution(&mut self, key: &str, of: &TimeHistogram) {
         self.distribution_in(key, of, Nanos::from_micros(1), "_us");
+        self.distributions.push(Distribution::new(key, of));
     }
 
     /// As [`distribution`](Self::distribution), in multiples of `unit`, which `suffix` names.
@@ -141,7 +195,7 @@ impl Statistics {
 /// One `key=value` per line.
 impl fmt::Display for Statistics {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0
+        self.entries
             .iter()
             .try_for_each(|(key, value)| writeln!(f, "{key}={value}"))
     }
@@ -206,6 +260,33 @@ mod tests {
                 ("station.x=y.stale", "true"),
             ]
         );
+    }
+
+    #[test]
+    fn a_distribution_counts_the_times_up_to_each_bound() {
+        let mut spans = TimeHistogram::new();
+        for micros in [1, 40, 900, 30_000_000] {
+            spans.record(Nanos::from_micros(micros));
+        }
+        let mut statistics = Statistics::default();
+        statistics.distribution("age", &spans);
+        let [age] = statistics.distributions() else {
+            panic!("not one distribution: {statistics:?}");
+        };
+        let up_to = |micros: i64| {
+            let at = |bound: &Nanos| *bound == Nanos::from_micros(micros);
+            age.up_to[Distribution::BOUNDS.iter().position(at).expect("a bound")]
+        };
+        let found = [
+            up_to(25),
+            up_to(50),
+            up_to(500),
+            up_to(1_000),
+            up_to(10_000_000),
+        ];
+        assert_eq!(found, [1, 2, 2, 3, 3]);
+        assert_eq!((age.key.as_str(), age.count), ("age", 4));
+        assert!((age.sum - 30.000_941).abs() < 1e-9, "{}", age.sum);
     }
 
     #[test]

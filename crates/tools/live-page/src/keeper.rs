@@ -31,7 +31,7 @@ const PICTURE: &str = "/picture/";
 
 const JSON: &str = "application/json";
 const SVG: &str = "image/svg+xml";
-const METRICS: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
+const METRICS: &str = "text/plain; version=0.0.4; charset=utf-8";
 
 /// A request of the room.
 pub(crate) enum Wish {

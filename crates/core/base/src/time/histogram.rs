@@ -100,6 +100,11 @@ impl TimeHistogram {
         }
     }
 
+    /// The sum of all spans in nanoseconds.
+    pub fn sum(&self) -> f64 {
+        as_float(self.sum)
+    }
+
     /// The standard deviation in nanoseconds; zero without spans.
     pub fn deviation(&self) -> f64 {
         let count = u128::from(self.count());

@@ -215,7 +215,11 @@ const ONE: u64 = 1.0_f64.to_bits();
 
 /// Eight slots as one byte, the first slot as bit 0: correct if the slots [are plain](are_plain); for that check, their
 /// bits are added to `seen`. One operation thus handles several slots, without looking at their values.
-#[inline]
+#[expect(
+    clippy::inline_always,
+    reason = "it is most of a small tick, and as a call it would keep `seen` in memory"
+)]
+#[inline(always)]
 fn pack(slots: &[Slot; 8], seen: &mut i64x2) -> u8 {
     let pair = |first: usize| i64x2::new([slots[first].signed(), slots[first + 1].signed()]);
     let pairs = [pair(0), pair(2), pair(4), pair(6)];

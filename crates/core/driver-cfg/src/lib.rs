@@ -15,6 +15,7 @@ mod options;
 mod overlay;
 mod page;
 mod real_time;
+mod restart;
 mod timing;
 
 /// The kinds that this crate's tests use.

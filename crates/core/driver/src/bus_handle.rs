@@ -5,8 +5,8 @@ use std::sync::Arc;
 use tickbus_base::time::Manual;
 use tickbus_fieldbus::{Bus, Free, Lead, Port, Stepped};
 
+use super::line::FreeLine;
 use super::replay::Replay;
-use super::supervise::BusThread;
 
 /// A bus that is open but does not run yet.
 pub(super) enum OpenBus {
@@ -27,8 +27,7 @@ pub(super) enum SteppedBus {
 #[expect(clippy::large_enum_variant, reason = "there is one in a driver")]
 pub(super) enum BusHandle {
     /// Runs on its own thread; dropping this ends it.
-    #[expect(dead_code, reason = "kept for its drop")]
-    Free(BusThread),
+    Free(FreeLine),
     /// On the tick, in simulation time.
     Stepped {
         bus: SteppedBus,

@@ -10,6 +10,7 @@ use tickbus_plc::Program;
 
 use super::bus_handle::{OpenBus, SteppedBus};
 use super::host::{HostThread, ScanSetup, check_fit};
+use super::line::Line;
 use super::open::swallowed_of;
 use super::recording::recorder;
 use super::watch::Watch;
@@ -121,6 +122,12 @@ impl Host {
     pub fn watch(&self) -> Option<Watch> {
         let mut watch = self.0.watch.lock().unwrap_or_else(PoisonError::into_inner);
         watch.take()
+    }
+
+    /// Returns the line, whose settings can be changed while the program is scanned; `None` on a bus that hands out the
+    /// time.
+    pub fn line(&self) -> Option<Line> {
+        self.0.line()
     }
 
     /// Returns the injected faults of this end.

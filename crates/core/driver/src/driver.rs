@@ -5,14 +5,14 @@ use std::sync::Arc;
 use tickbus_base::QuickClock;
 use tickbus_base::time::{Clock, Nanos};
 use tickbus_fieldbus::faults::FaultBoard;
-use tickbus_fieldbus::{Lead, Link, LinkStatus, SwallowedSignals};
+use tickbus_fieldbus::{Lead, Link, LinkStatus, MaxAge, SwallowedSignals};
 use tickbus_image::signal::Slot;
 use tickbus_image::{Event, TickEnd};
 use tickbus_record::Recorder;
 
 use super::bus_handle::BusHandle;
 use super::extras::Extras;
-use super::host::OtherEnd;
+use super::line::Line;
 use super::recording::Recorded;
 use super::shape::Shape;
 use super::station::Station;
@@ -34,7 +34,7 @@ pub struct Driver {
     pub(super) clock: Arc<dyn Clock>,
     /// The same clock, read quickly for the tick.
     pub(super) quick: QuickClock,
-    pub(super) max_age: Nanos,
+    pub(super) max_age: MaxAge,
     pub(super) status: LinkStatus,
     pub(super) counters: TickCounters,
     pub(super) samples: TickTimes,
@@ -53,7 +53,6 @@ pub struct Driver {
     pub(super) shape: Shape,
     pub(super) board: Arc<FaultBoard>,
     pub(super) swallowed: SwallowedSignals,
-    pub(super) program: Option<OtherEnd>,
     pub(super) program_counters: ProgramCounters,
     pub(super) recorder: Option<Recorder>,
     /// The ticks that the recording has so far.
@@ -71,6 +70,14 @@ impl Driver {
     /// Returns the arrangement of values in the slots.
     pub fn slots(&self) -> &SlotMap {
         &self.slots
+    }
+
+    /// Returns the line, whose settings can be changed while the driver runs; `None` on a stepped bus.
+    pub fn line(&self) -> Option<Line> {
+        match &self.line {
+            BusHandle::Free(line) => Some(line.handle()),
+            BusHandle::Stepped { .. } => None,
+        }
     }
 
     /// Returns true if the bus is stepped: a tick may then wait for the bus.

@@ -330,16 +330,17 @@ impl Driver {
             _ => (tick.time, Ok(())),
         };
         let (mut code, mut age) = (Code::Fresh, Nanos::ZERO);
+        let max_age = self.max_age.get();
         let image = &mut self.image;
         image.update();
         match &mut self.stations[..] {
             [station] => {
-                age = station.receive(image, (now, self.max_age), slots, &self.slots);
+                age = station.receive(image, (now, max_age), slots, &self.slots);
                 code = station.status;
             }
             stations => {
                 for station in stations {
-                    age = age.max(station.receive(image, (now, self.max_age), slots, &self.slots));
+                    age = age.max(station.receive(image, (now, max_age), slots, &self.slots));
                     code = code.worse(station.status);
                 }
             }

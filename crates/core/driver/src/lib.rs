@@ -11,6 +11,7 @@ mod frames;
 mod heartbeat;
 mod host;
 mod inject;
+mod line;
 #[cfg(test)]
 mod model_faults_tests;
 mod open;
@@ -41,6 +42,7 @@ static KINDS: tickbus_driver_cfg::Kinds =
 pub use controller::Host;
 pub use driver::Driver;
 pub use error::DriverError;
+pub use line::{Line, Untaken};
 pub use slots::SlotMap;
 pub use statistics::Snapshot;
 pub use status::Code;

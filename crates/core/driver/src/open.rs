@@ -6,9 +6,7 @@ use tickbus_axis::Reflexes;
 use tickbus_base::QuickClock;
 use tickbus_base::time::{Clock, Manual, Nanos};
 use tickbus_fieldbus::faults::FaultBoard;
-use tickbus_fieldbus::{
-    Cause, ChangeEvents, Events, LinkState, LinkStatus, Port, Role, Steps, SwallowedSignals,
-};
+use tickbus_fieldbus::{Cause, Events, LinkState, LinkStatus, Port, Role, Steps, SwallowedSignals};
 use tickbus_image::{BusEnd, EVENT_CAPACITY, TickEnd, image_counting};
 use tickbus_reply::Replies;
 
@@ -18,12 +16,12 @@ use super::extras::Extras;
 use super::frames::directions;
 use super::heartbeat::Beat;
 use super::host::OtherEnd;
+use super::line::{Ends, FreeLine, Scanned};
 use super::real_time;
 use super::recording::{Recorded, recorder};
 use super::shape::Shape;
 use super::station::Station;
 use super::statistics::{Counters, ProgramCounters};
-use super::supervise::BusThread;
 use super::tick_counters::TickTimes;
 use super::{Driver, DriverError, Exchange, SlotMap, TickCounters};
 use tickbus_driver_cfg::Config;
@@ -61,12 +59,16 @@ impl Driver {
         // Before the bus starts: setting up this clock takes time, in which the bus would find no tick.
         let quick = QuickClock::new(Arc::clone(&clock));
         let board = Arc::<FaultBoard>::default();
-        let times = (&clock, &simulation_time);
-        let line = start(&config, bus, bus_end, times, (&status, &board, &swallowed))?;
         // A reset finds the files again though the working folder has changed. Mistakes have named the path as given.
         if let Ok(path) = std::path::absolute(&config.path) {
             config.path = path;
         }
+        let config = Arc::new(config);
+        let times = (&clock, &simulation_time);
+        let program_counters = ProgramCounters::new(counters_of(program.as_ref()));
+        let line = (&status, &board, &swallowed);
+        let opened = (bus, program);
+        let line = start(&config, opened, bus_end, times, line, &program_counters)?;
         let stations = (0..config.table.stations.len())
             .map(|index| Station::new(&config.table, index, areas))
             .collect();
@@ -78,7 +80,7 @@ impl Driver {
             line,
             quick,
             clock,
-            max_age: config.timing.max_age,
+            max_age: status.limit(),
             status,
             counters: TickCounters::default(),
             samples: TickTimes::default(),
@@ -91,11 +93,10 @@ impl Driver {
             shape: Shape::Extended,
             board,
             swallowed,
-            program_counters: ProgramCounters::new(counters_of(program.as_ref())),
-            program,
+            program_counters,
             recorded: Recorded::default(),
             tap: None,
-            config: Arc::new(config),
+            config,
         };
         driver.inject_configured()?;
         driver.shape = driver.fitting_shape();
@@ -156,36 +157,34 @@ pub(super) fn swallowed_of(config: &Config, name: &str) -> SwallowedSignals {
     SwallowedSignals::new(name, &config.table, config.role, [cycles, own])
 }
 
-/// Starts a bus on its own thread, or prepares it for the tick, which advances `time`; `clock` is the clock of the line.
+/// Starts a bus on its own thread, or prepares it for the tick, which advances `time`; `clock` is the clock of the line,
+/// and `counters` are those of a program at the other end.
 pub(super) fn start(
-    config: &Config,
-    bus: OpenBus,
+    config: &Arc<Config>,
+    (bus, program): (OpenBus, Option<OtherEnd>),
     image: BusEnd,
     (clock, time): (&Arc<dyn Clock>, &Arc<Manual>),
     (status, board, swallowed): (&LinkStatus, &Arc<FaultBoard>, &SwallowedSignals),
+    counters: &ProgramCounters,
 ) -> Result<BusHandle, DriverError> {
-    let (table, role, timing) = (&config.table, config.role, &config.timing);
-    let (clock, watchdog) = (Arc::clone(clock), timing.watchdog);
-    let mut port = Port::new(image, clock, role, watchdog, status.clone())
+    let (role, watchdog) = (config.role, config.timing.watchdog);
+    let port = Port::new(image, Arc::clone(clock), role, watchdog, status.clone())
         .with_faults(Arc::clone(board))
-        .with_swallowed(swallowed.clone())
-        .with_life_signs(config.life_signs.watches(table, role, timing.max_age))
-        .with_names(table.stations.iter().map(|s| s.name.as_str()));
-    if config.events != Events::None {
-        let (_, rx) = role.areas();
-        let stations = 0..table.stations.len();
-        let changes = stations.map(|station| ChangeEvents::new(table, station, rx));
-        port = port.with_changes(changes.collect());
-    }
+        .with_swallowed(swallowed.clone());
+    let ends = Ends {
+        name: config.name.clone(),
+        clock: Arc::clone(clock),
+        status: status.clone(),
+        scanned: Scanned::Ticks(counters.clone()),
+    };
     Ok(match bus {
         OpenBus::Free(bus) => {
-            let own = (&*config.name, config.real_time);
-            let thread = BusThread::start(bus, port, table, timing, status.clone(), own);
-            BusHandle::Free(thread.map_err(|source| DriverError::no_thread("the bus", source))?)
+            let other = (program, swallowed.clone());
+            BusHandle::Free(FreeLine::start(config, (bus, port), other, ends)?)
         }
         OpenBus::Stepped(bus) => BusHandle::Stepped {
             bus,
-            port,
+            port: ends.equipped(port, config),
             time: Arc::clone(time),
         },
     })

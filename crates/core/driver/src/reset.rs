@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use tickbus_base::time::Nanos;
+use tickbus_driver_cfg::Config;
 use tickbus_driver_cfg::loopback::{Options, Peer};
 use tickbus_fieldbus::{Cause, LinkState};
 use tickbus_image::signal::Slot;
@@ -61,32 +62,54 @@ impl Driver {
 
     /// Returns true if nothing outside this driver depends on the line, or on its time.
     fn has_own_line(&self) -> bool {
-        let options = self.config.bus.downcast_ref::<Options>();
+        let config = self.line_config();
+        let options = config.bus.downcast_ref::<Options>();
         options.is_some_and(|options| match options.peer {
             Peer::Program { .. } | Peer::Replay(_) => true,
             Peer::Link(_) => self.is_stepped(),
         })
     }
 
+    /// Returns the present settings of the line, which may be others than those that the driver was opened with.
+    fn line_config(&self) -> Arc<Config> {
+        let present = match &self.line {
+            BusHandle::Free(line) => line.config(),
+            BusHandle::Stepped { .. } => None,
+        };
+        present.unwrap_or_else(|| Arc::clone(&self.config))
+    }
+
     /// Opens the line and the other end again, in place of the present ones, whose tick ends with these `slots`.
     fn reopen_line(&mut self, slots: &[Slot]) -> Result<(), DriverError> {
         // The present line counts until it ends, which takes longer than the next one needs to begin.
         let swallowed = self.swallowed.of_next_line();
-        let (bus, program) = bus::open(&self.config, &self.clock, None, &swallowed)?;
-        let (image, bus_end) = image_of(&self.config, &swallowed);
+        let config = self.line_config();
+        let (bus, program) = bus::open(&config, &self.clock, None, &swallowed)?;
+        let (image, bus_end) = image_of(&config, &swallowed);
+        let counters = counters_of(program.as_ref());
         let time = match &self.line {
             BusHandle::Stepped { time, .. } => Arc::clone(time),
             BusHandle::Free(_) => Arc::default(),
         };
         let (status, times) = (&self.status, (&self.clock, &time));
         let line = (status, &self.board, &swallowed);
-        let line = start(&self.config, bus, bus_end, times, line)?;
+        let opened = (bus, program);
+        let line = start(
+            &config,
+            opened,
+            bus_end,
+            times,
+            line,
+            &self.program_counters,
+        )?;
         // The present tick and line end only now, so that a failure leaves them as they are.
         self.end_tick(slots);
-        self.line = line;
+        match (&self.line, line) {
+            (BusHandle::Free(before), BusHandle::Free(next)) => before.go_on_with(&next),
+            (_, line) => self.line = line,
+        }
         self.image = image;
-        self.program_counters.replace(counters_of(program.as_ref()));
-        self.program = program;
+        self.program_counters.replace(counters);
         swallowed.begin();
         self.swallowed = swallowed;
         if self.is_stepped() {

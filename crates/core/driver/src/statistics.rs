@@ -102,7 +102,7 @@ impl Figures {
         }
         self.status.write(now, &mut statistics);
         if let Some(ticks) = ticks {
-            ticks.write_stations(&mut statistics);
+            ticks.write_stations(self.status.max_age(), &mut statistics);
             ticks.samples.write(&mut statistics);
         }
         self.swallowed.write(&mut statistics);
@@ -126,14 +126,14 @@ impl TickFigures {
     }
 
     /// Adds the age of each station's data and its number of bus cycles; adds nothing for a single station.
-    fn write_stations(&self, statistics: &mut Statistics) {
+    fn write_stations(&self, max_age: Nanos, statistics: &mut Statistics) {
         if self.stations.len() < 2 {
             return;
         }
         let sections = &self.config.table.stations;
         for ((age, is_valid, cycles), section) in self.stations.iter().zip(sections) {
             let key = |tail| Key::of("station", &section.name, tail);
-            let stale = is_stale(*age, self.config.timing.max_age, *is_valid);
+            let stale = is_stale(*age, max_age, *is_valid);
             statistics.text(key("stale"), if stale { "true" } else { "false" });
             if *age != Nanos::MAX {
                 statistics.number(key("age_ms"), age.as_micros() / 1e3, 3);

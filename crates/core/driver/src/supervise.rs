@@ -2,7 +2,8 @@
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use log::Level;
 use tickbus_base::RealTime;
@@ -32,6 +33,15 @@ pub(super) struct BusThread {
     farewell: Option<Farewell>,
     clock: Arc<dyn Clock>,
     thread: Option<Thread>,
+    handover: Arc<Handover>,
+}
+
+/// The way of a port from a bus that ends to the next one.
+#[derive(Debug, Default)]
+struct Handover {
+    /// True if the line goes on after this bus.
+    goes_on: AtomicBool,
+    port: Mutex<Option<Port>>,
 }
 
 impl BusThread {
@@ -56,13 +66,22 @@ impl BusThread {
         let stop = Stop::new();
         let close_timeout = bus.close_timeout();
         let clock = Arc::clone(port.clock());
+        let handover = Arc::<Handover>::default();
         let thread = Thread::spawn(&*clock, &format!("bus {name}"), {
             let (stop, status, clock) = (stop.clone(), status.clone(), Arc::clone(&clock));
+            let handover = Arc::clone(&handover);
             move || {
                 // Freeing the bus's resources, such as unloading a library, may take time: the thread ends after that.
                 let (mut bus, mut port) = (bus, port);
                 begin(real_time, "the bus", &status, &*clock);
-                serve(&mut *bus, &mut port, &*clock, &reconnect, &status, &stop);
+                let has_panicked =
+                    !serve(&mut *bus, &mut port, &*clock, &reconnect, &status, &stop);
+                if handover.goes_on.load(Ordering::SeqCst) {
+                    drop(bus);
+                    *handover.lock() = Some(port);
+                } else if !has_panicked {
+                    status.enter(clock.now(), LinkState::Closed, Cause::Closed, "closed");
+                }
             }
         })?;
         Ok(Self {
@@ -73,7 +92,17 @@ impl BusThread {
             farewell,
             clock,
             thread: Some(thread),
+            handover,
         })
+    }
+
+    /// Ends the bus as a drop does, and returns its port for the next bus; `None` if the bus is stuck in a call.
+    pub(super) fn end_for_next(self) -> Option<Port> {
+        self.handover.goes_on.store(true, Ordering::SeqCst);
+        let handover = Arc::clone(&self.handover);
+        drop(self);
+        let port = handover.lock().take();
+        port
     }
 
     /// Leaves the peer, if there is one, with the fail-safe values.
@@ -102,6 +131,13 @@ impl BusThread {
     }
 }
 
+impl Handover {
+    fn lock(&self) -> MutexGuard<'_, Option<Port>> {
+        // The port is there as a whole, or not.
+        self.port.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
 impl Drop for BusThread {
     fn drop(&mut self) {
         self.take_leave();
@@ -120,6 +156,7 @@ impl Drop for BusThread {
     }
 }
 
+/// Runs the bus until `stop`; returns false if it panicked before.
 fn serve(
     bus: &mut dyn Free,
     port: &mut Port,
@@ -127,7 +164,7 @@ fn serve(
     reconnect: &[Nanos],
     status: &LinkStatus,
     stop: &Stop,
-) {
+) -> bool {
     let mut attempt = 0;
     while !stop.is_stopped() {
         port.opening("opening the line");
@@ -142,7 +179,7 @@ fn serve(
                     panic_text(&*panic)
                 );
                 status.enter(clock.now(), LinkState::Failed, Cause::Defect, &reason);
-                return;
+                return false;
             }
         };
         port.line_ended();
@@ -160,7 +197,7 @@ fn serve(
             clock.wait_until(next, stop);
         }
     }
-    status.enter(clock.now(), LinkState::Closed, Cause::Closed, "closed");
+    true
 }
 
 /// Returns the message of a panic.

@@ -73,6 +73,12 @@ impl Watch {
         self.config.role
     }
 
+    /// Returns the age beyond which data are stale at present: the line may have other settings than
+    /// [`config`](Self::config).
+    pub fn max_age(&self) -> Nanos {
+        self.figures.status.max_age()
+    }
+
     /// Returns the area that this end writes.
     pub fn writes(&self) -> Area {
         self.role().areas().0

@@ -10,6 +10,7 @@ use tickbus_base::statistics::{Key, Statistics};
 use tickbus_base::time::{Nanos, SharedHistogram};
 
 use super::BusError;
+use super::max_age::MaxAge;
 use super::rarely::Rarely;
 use super::traffic::{Rates, Traffic};
 use tickbus_image::is_stale;
@@ -155,7 +156,7 @@ pub struct LinkStatus(Arc<Shared>);
 #[derive(Debug)]
 struct Shared {
     driver: String,
-    max_age: Nanos,
+    max_age: MaxAge,
     /// The names of the stations, if there are several.
     stations: Vec<String>,
     /// A copy of the record's state that can be read without the lock.
@@ -227,7 +228,7 @@ impl LinkStatus {
         };
         Self(Arc::new(Shared {
             driver: driver.to_owned(),
-            max_age,
+            max_age: MaxAge::new(max_age),
             traffic: Traffic::new(stations.len()),
             stations,
             state: AtomicU8::new(0),
@@ -265,7 +266,20 @@ impl LinkStatus {
 
     /// The limit of age.
     pub fn max_age(&self) -> Nanos {
-        self.0.max_age
+        self.0.max_age.get()
+    }
+
+    /// The limit of age, for others who compare with it.
+    pub fn limit(&self) -> MaxAge {
+        self.0.max_age.clone()
+    }
+
+    /// Forgets what the bus has reported, because another one takes its place: facts, a call that hangs, and doubts about
+    /// received data. Counters stay.
+    pub fn forget_bus(&self) {
+        let mut record = self.lock();
+        record.facts.clear();
+        (record.call, record.before_hang, record.doubt) = (None, None, None);
     }
 
     /// The current state, without a lock.
@@ -345,7 +359,7 @@ impl LinkStatus {
         if !matches!(record.link.state, LinkState::Running | LinkState::Stale) {
             return;
         }
-        let limit = self.0.max_age;
+        let limit = self.max_age();
         let stale = ages
             .clone()
             .filter(|age| is_stale(*age, limit, true))
@@ -371,7 +385,7 @@ impl LinkStatus {
     /// unless something changes.
     #[inline]
     pub fn observe(&self, now: Nanos, ages: impl Iterator<Item = Nanos> + Clone) {
-        let limit = self.0.max_age;
+        let limit = self.max_age();
         let stale = ages
             .clone()
             .filter(|age| is_stale(*age, limit, true))
@@ -388,7 +402,7 @@ impl LinkStatus {
     /// entered a state at a later time than `now`, which then stays.
     #[cold]
     fn look_again(&self, now: Nanos, ages: impl Iterator<Item = Nanos> + Clone) {
-        let limit = self.0.max_age;
+        let limit = self.max_age();
         let mut record = self.lock();
         if now < record.link.since {
             return;
@@ -533,7 +547,7 @@ impl LinkStatus {
         statistics.count("cause.code", link.cause as u64);
         statistics.text("reason", &link.reason);
         statistics.number("state.for_s", (now - link.since).as_micros() / 1e6, 3);
-        statistics.time("max_age", self.0.max_age);
+        statistics.time("max_age", self.max_age());
         for (key, fact) in &record.facts {
             statistics.text(key.clone(), fact);
         }
@@ -648,6 +662,7 @@ impl Shared {
         shown: Nanos,
         ages: impl Iterator<Item = Nanos> + Clone,
     ) -> String {
+        let limit = self.max_age.get();
         let mut reason = "nothing has come from ".to_owned();
         // Writing to a string cannot fail.
         if self.stations.len() < 2 {
@@ -655,7 +670,7 @@ impl Shared {
             let _ = write!(reason, "the peer for {}", age.rounded());
         } else {
             let silent = ages.zip(&self.stations);
-            let silent = silent.filter(|(age, _)| *age > self.max_age);
+            let silent = silent.filter(|(age, _)| *age > limit);
             for (index, (age, name)) in silent.enumerate() {
                 let comma = if index > 0 { ", " } else { "" };
                 let _ = write!(reason, "{comma}station \"{name}\" ");
@@ -665,7 +680,7 @@ impl Shared {
                 };
             }
         }
-        let _ = write!(reason, "; the limit is max_age = {}", self.max_age);
+        let _ = write!(reason, "; the limit is max_age = {limit}");
         if !record.injected.is_empty() {
             let _ = write!(reason, "; injected fault: {}", record.injected);
         }

@@ -10,6 +10,7 @@ mod faults;
 mod frames;
 mod image;
 mod looks;
+mod next_bus;
 
 pub use calls::CallWatch;
 pub use ending::{Farewell, Outputs};

@@ -43,6 +43,9 @@ pub struct BusEnd {
 struct BusStation {
     rx: Place,
     rx_edges: EdgeCounter,
+    rx_fail_safe: Box<[u8]>,
+    /// True if the bytes are those of a peer whose place another one has taken, which has not been heard yet.
+    expects_other: bool,
     tx: Place,
     tx_shaper: PulseShaper,
     tx_fail_safe: Box<[u8]>,
@@ -73,6 +76,8 @@ impl BusEnd {
         let stations = stations.map(|((streams, tx), rx)| BusStation {
             rx,
             rx_edges: EdgeCounter::new(&streams.rx_latched, &streams.rx_fail_safe),
+            rx_fail_safe: streams.rx_fail_safe.clone(),
+            expects_other: false,
             tx,
             tx_shaper: PulseShaper::new(streams.tx_latched, &streams.tx_fail_safe),
             outgoing: streams.tx_fail_safe.clone(),
@@ -264,6 +269,9 @@ impl BusEnd {
     ///
     /// When `bytes` is not exactly as long as the station's rx bytes: wire code must check lengths.
     pub fn received(&mut self, station: usize, now: Nanos, bytes: &[u8], is_valid: bool) {
+        if self.stations[station].expects_other {
+            self.other_peer(station);
+        }
         let BusStation {
             rx,
             rx_edges,
@@ -298,9 +306,35 @@ impl BusEnd {
     /// The peer of a station is alive, though it sent no new data.
     #[inline]
     pub fn touch(&mut self, station: usize, now: Nanos) {
+        if self.stations[station].expects_other {
+            self.other_peer(station);
+            // Bytes of the same number are the same.
+            self.staged.heads[station].sequence += 1;
+        }
         let head = &mut self.staged.heads[station];
         self.is_news |= head.heard != now.0 || self.is_cycle;
         head.heard = now.0;
+    }
+
+    /// Other peers take the place of all stations' peers: nothing has arrived from them, so the data are stale. With their
+    /// first sign of life the fail-safe bytes replace the last ones of the peers before, without edges.
+    pub fn expect_other_peers(&mut self) {
+        for (station, head) in self.stations.iter_mut().zip(&mut self.staged.heads) {
+            (head.heard, head.is_valid) = (NEVER, true);
+            station.expects_other = true;
+        }
+        (0..self.stations()).for_each(|station| self.peer_left(station));
+        self.is_news = true;
+    }
+
+    /// The first sign of life of another peer.
+    #[cold]
+    fn other_peer(&mut self, station: usize) {
+        let other = &mut self.stations[station];
+        other.expects_other = false;
+        let place = &mut self.staged.bytes[other.rx.bytes.clone()];
+        copy_frame(place, &other.rx_fail_safe);
+        other.rx_edges.pass(&other.rx_fail_safe);
     }
 
     /// Sets whether the data of a station's peer are valid.

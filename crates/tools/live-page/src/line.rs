@@ -158,7 +158,7 @@ pub(crate) fn json(id: i32, watch: &Watch, link: &Link, statistics: &Statistics)
         let sections = config.table.stations.iter().zip(&view.stations);
         let stations = sections.map(|(section, station)| {
             let age = age_now(station, silence);
-            let max_age = config.timing.max_age;
+            let max_age = watch.max_age();
             let stale = is_stale(age, max_age, station.is_valid);
             let reason = match (age, stale) {
                 (_, false) => String::new(),

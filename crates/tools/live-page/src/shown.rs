@@ -310,7 +310,7 @@ impl Exhibit for Shown {
         let silence = self.watch.silence();
         let sections = self.watch.config().table.stations.iter();
         self.watch.view(|view| {
-            let max_age = self.watch.config().timing.max_age;
+            let max_age = self.watch.max_age();
             let stations = sections.zip(&view.stations);
             let stations = stations.map(|(section, station)| Freshness {
                 name: &section.name,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::frames::directions;
 use tickbus_base::time::Nanos;
 use tickbus_driver_cfg::Config;
-use tickbus_fieldbus::Role;
+use tickbus_fieldbus::{MaxAge, Role};
 use tickbus_image::{
     BusEnd, EVENT_CAPACITY, Peers, Receiver, Swallowed, TickEnd, copy_frame, image_counting,
 };
@@ -20,7 +20,7 @@ pub(super) struct Cpu {
     /// The program of the first station, and a further instance for each other station.
     units: Vec<Unit>,
     tick: TickEnd,
-    max_age: Nanos,
+    pub(super) max_age: MaxAge,
     pub(super) scan_counters: Arc<ScanCounters>,
     /// The end that a driver.cfg describes; `None` for a program behind the bus of one.
     pub(super) own: Option<OwnEnd>,
@@ -78,8 +78,9 @@ impl Cpu {
             own.begin(now, units);
         }
         self.tick.update();
+        let max_age = self.max_age.get();
         for unit in &mut *units {
-            read(unit, (now, self.max_age), &mut self.tick, own.as_mut());
+            read(unit, (now, max_age), &mut self.tick, own.as_mut());
         }
         if let Some(own) = own {
             own.received(units);
@@ -123,7 +124,7 @@ pub(super) fn half(
     let cpu = Cpu {
         units: units(program, (config, role), &scan_counters),
         tick,
-        max_age: config.timing.max_age,
+        max_age: MaxAge::new(config.timing.max_age),
         scan_counters,
         own: None,
     };

@@ -13,4 +13,4 @@ pub(super) use fit::{check_fit, program_error};
 pub(super) use program::OtherEnd;
 use scan_counters::ScanCounters;
 pub(super) use stepped::SteppedHost;
-pub(super) use thread::{HostThread, ScanSetup};
+pub(super) use thread::{HostThread, ScanSetup, watchdog};

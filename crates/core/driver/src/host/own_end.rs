@@ -7,7 +7,7 @@ use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::faults::{Effect, FaultBoard, Slots, TickTime};
-use tickbus_fieldbus::{Role, is_stale};
+use tickbus_fieldbus::{MaxAge, Role, is_stale};
 use tickbus_image::TickEnd;
 use tickbus_image::signal::{Plan, Slot};
 use tickbus_record::Recorder;
@@ -23,6 +23,8 @@ use crate::{Code, SlotMap};
 /// The end of a line that a driver.cfg describes, beside the frames of its program.
 pub(super) struct OwnEnd {
     config: Arc<Config>,
+    /// The limit of age of its line.
+    pub(super) max_age: MaxAge,
     extras: Extras,
     /// The signals that replies make.
     replied: Vec<usize>,
@@ -101,6 +103,7 @@ impl OwnEnd {
             received: frame(station.bytes(reads)),
         });
         Ok(Self {
+            max_age: MaxAge::new(config.timing.max_age),
             extras,
             replied,
             recorder,
@@ -254,7 +257,7 @@ impl OwnEnd {
             return;
         }
         let (stations, moment) = (&self.stations, self.moment);
-        let max_age = self.config.timing.max_age;
+        let max_age = self.max_age.get();
         self.tap.show(|view| {
             let mut code = Code::Fresh;
             let units = units.iter().zip(stations).zip(&mut view.stations);

@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::DriverError;
+use crate::line::{Ends, FreeLine, Line, Scanned};
 use crate::real_time;
 use crate::statistics::{Counters, Figures, ProgramCounters};
 use crate::supervise::{BusThread, panic_text};
@@ -12,10 +13,11 @@ use crate::watch::Watch;
 use tickbus_base::statistics::Statistics;
 use tickbus_base::thread::Thread;
 use tickbus_base::time::{Clock, Manual, Nanos, Pace, Stop};
-use tickbus_driver_cfg::{Config, Timing};
+use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::faults::FaultBoard;
 use tickbus_fieldbus::{
-    Bus, BusError, Lead, LinkState, LinkStatus, Outputs, Port, Role, Stepped, SwallowedSignals,
+    Bus, BusError, Lead, LinkState, LinkStatus, MaxAge, Outputs, Port, Role, Stepped,
+    SwallowedSignals,
 };
 use tickbus_image::Peers;
 use tickbus_plc::{Program, Report};
@@ -86,8 +88,18 @@ pub(crate) struct HostThread {
     pub(crate) watch: Mutex<Option<Watch>>,
     stop: Stop,
     thread: Option<Thread>,
-    /// Kept for its drop; `None` if the program's thread steps the bus.
-    bus: Option<BusThread>,
+    /// `None` if the program's thread steps the bus.
+    bus: Option<HostBus>,
+}
+
+/// The bus thread of a program.
+#[derive(Debug)]
+enum HostBus {
+    /// At the end that the driver.cfg describes.
+    Own(FreeLine),
+    /// At the other end.
+    #[expect(dead_code, reason = "kept for its drop")]
+    Other(BusThread),
 }
 
 impl HostThread {
@@ -118,9 +130,7 @@ impl HostThread {
         };
         let board = Arc::<FaultBoard>::default();
         let mut port = Port::new(bus_end, Arc::clone(&clock), role, limit, status.clone())
-            .with_faults(Arc::clone(&board))
-            .with_life_signs(config.life_signs.watches(&config.table, role, max_age))
-            .with_names(config.table.stations.iter().map(|s| s.name.as_str()));
+            .with_faults(Arc::clone(&board));
         let counters = Arc::new(HostCounters {
             scan_counters: Arc::clone(&cpu.scan_counters),
             fault: Mutex::new(None),
@@ -145,24 +155,47 @@ impl HostThread {
             let (tap, own) = Watch::new(Arc::clone(&config), clock, figures.clone(), false);
             watch = Some(own);
             let end = OwnEnd::new(config, &board, tap, hosted.recorder);
-            cpu.own = Some(end.map_err(DriverError::Fault)?);
+            let mut end = end.map_err(DriverError::Fault)?;
+            (end.max_age, cpu.max_age) = (status.limit(), status.limit());
+            cpu.own = Some(end);
         }
+        let pause = MaxAge::new(watchdog.unwrap_or(Nanos::MAX));
+        let ends = Ends {
+            name: name.clone(),
+            clock: Arc::clone(&counters.wall),
+            status: status.clone(),
+            scanned: Scanned::Program {
+                interval,
+                stop: stop.clone(),
+                has_watchdog: hosted.has_watchdog,
+                watchdog: pause.clone(),
+            },
+        };
         let (scanned, stopped) = (Arc::clone(&counters), stop.clone());
         let (bus, mut scans): (_, Box<dyn FnMut() -> Result<(), String> + Send>) = match bus {
             Bus::Free(bus) => {
-                let (table, timing) = (&config.table, timing(config, is_own));
                 let (real_time, scanning) = (config.real_time, status.clone());
-                let bus = BusThread::start(bus, port, table, &timing, status, (name, real_time));
-                let bus = bus.map_err(|source| DriverError::no_thread("the bus", source))?;
+                let bus = if is_own {
+                    let own = Arc::new(config.clone());
+                    let other = (None, figures.swallowed.clone());
+                    HostBus::Own(FreeLine::start(&own, (bus, port), other, ends)?)
+                } else {
+                    // The machine at the other end of this line closes with the program.
+                    let mut config = config.clone();
+                    (config.timing.at_close, config.timing.while_stale) =
+                        (Outputs::Hold, Outputs::Hold);
+                    let port = ends.equipped_as(role, port, &config);
+                    HostBus::Other(ends.start(&config, bus, port)?)
+                };
                 let scans = move || {
                     real_time::begin(real_time, "the PLC program", &scanning, &*scanned.wall);
-                    scan_until_stopped(&mut cpu, (interval, watchdog), &stopped, &scanned);
+                    scan_until_stopped(&mut cpu, (interval, &pause), &stopped, &scanned);
                     Ok(())
                 };
                 (Some(bus), Box::new(scans))
             }
             Bus::Stepped(mut bus) => {
-                let mut port = port;
+                let mut port = ends.equipped_as(role, port, config);
                 let scans = move || {
                     let line = (&mut *bus, &mut port, &*virtual_time);
                     let ended = scan_in_steps(&mut cpu, line, &scanned, &stopped);
@@ -208,23 +241,17 @@ impl HostThread {
 
 /// Returns how long a program can pause between two scans: a CPU whose program has died must not keep its last outputs
 /// on the bus.
-fn watchdog(config: &Config, (is_own_end, role): (bool, Role), interval: Nanos) -> Option<Nanos> {
+pub(crate) fn watchdog(
+    config: &Config,
+    (is_own_end, role): (bool, Role),
+    interval: Nanos,
+) -> Option<Nanos> {
     let two_scans = interval + interval;
     match config.timing.watchdog.filter(|_| is_own_end) {
         Some(stated) => Some(stated.max(two_scans)),
         None if is_own_end && role == Role::Controller => None,
         None => Some(two_scans.max(config.timing.max_age)),
     }
-}
-
-/// Returns the times of a program's line, and the values that the program leaves there.
-fn timing(config: &Config, is_own_end: bool) -> Timing {
-    let mut timing = config.timing.clone();
-    if !is_own_end {
-        // The machine at the other end of this line closes with the program.
-        (timing.at_close, timing.while_stale) = (Outputs::Hold, Outputs::Hold);
-    }
-    timing
 }
 
 impl Counters for HostCounters {
@@ -256,6 +283,14 @@ impl HostCounters {
 }
 
 impl HostThread {
+    /// Returns the line, if its bus has a thread and the driver.cfg describes this end.
+    pub(crate) fn line(&self) -> Option<Line> {
+        match &self.bus {
+            Some(HostBus::Own(line)) => Some(line.handle()),
+            Some(HostBus::Other(_)) | None => None,
+        }
+    }
+
     /// Checks the state of the line, in case the bus itself cannot, and returns the time. In the steps of a bus, only the
     /// bus knows whether data are late.
     pub(crate) fn observe(&self) -> Nanos {
@@ -292,7 +327,7 @@ impl Drop for HostThread {
 
 fn scan_until_stopped(
     cpu: &mut Cpu,
-    (interval, watchdog): (Nanos, Option<Nanos>),
+    (interval, watchdog): (Nanos, &MaxAge),
     stop: &Stop,
     HostCounters {
         clock, scanning, ..
@@ -305,11 +340,8 @@ fn scan_until_stopped(
         let now = clock.now();
         if pace.take(now) {
             scanning.set(Some(now));
-            let limit = last.zip(watchdog);
-            cpu.scan(
-                now,
-                limit.is_none_or(|(last, watchdog)| now - last <= watchdog),
-            );
+            let limit = watchdog.get();
+            cpu.scan(now, last.is_none_or(|last| now - last <= limit));
             last = Some(now);
             scanning.set(None);
         }

@@ -15,7 +15,21 @@ pub(crate) use open::{Place, options, show, show_run, url};
 use std::io::{self, Write as _};
 
 use tickbus_binding::Refusal;
-use tickbus_driver::{Code, Driver};
+use tickbus_driver::{Code, Driver, Line, Watch};
+use tickbus_driver_cfg::Config;
+
+/// The end of a line that a page shows, and that it edits if the driver.cfg says so.
+pub(crate) struct Shown<'a, W: FnOnce() -> Option<Watch>> {
+    pub(crate) config: &'a Config,
+    pub(crate) watch: W,
+    /// The line, which takes the changes of the file; `None` if its bus runs in step with the simulation.
+    pub(crate) line: Option<Line>,
+    /// Reads the file as it was read before; `None` if it cannot be edited here.
+    pub(crate) read: Option<Read>,
+}
+
+/// Reads a driver.cfg, or says what is wrong.
+pub(crate) type Read = Box<dyn Fn() -> Result<Config, String> + Send + Sync>;
 
 /// Says why a driver cannot be shown.
 #[derive(Debug)]
@@ -56,7 +70,15 @@ pub(crate) fn show_driver(driver: &mut Driver) -> Result<Option<Place>, Refusal>
         // The simulation runs even without a reader of stderr.
         let _ = writeln!(io::stderr(), "tickbus: live page at {url}");
     };
-    Ok(show(&config, || Some(driver.watch()), announce)?)
+    let (path, kinds) = (config.path.clone(), config.kinds);
+    let read = move || Config::load(&path, kinds).map_err(|mistakes| mistakes.to_string());
+    let shown = Shown {
+        config: &config,
+        line: driver.line(),
+        watch: || Some(driver.watch()),
+        read: Some(Box::new(read)),
+    };
+    Ok(show(shown, announce)?)
 }
 
 impl From<PageError> for Refusal {

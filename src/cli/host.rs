@@ -9,12 +9,12 @@ use serde_json::{Map, Value, json};
 
 use super::Outcome;
 use super::json::{Format, print_document};
-use crate::page::{self, PageError, Place};
+use super::reading::{Reading, Wrong};
+use crate::page::{self, PageError, Place, Shown};
 use tickbus_base::statistics::entries;
 use tickbus_base::time::{Clock, Monotonic, Nanos, Stop};
-use tickbus_base::toml_text::Mistakes;
 use tickbus_driver::{Host, Watch};
-use tickbus_driver_cfg::{CommandLineEnd, Config, Kinds, PageOptions};
+use tickbus_driver_cfg::{Config, Kinds, PageOptions};
 use tickbus_fieldbus::faults::{FaultStatus, Phase};
 use tickbus_fieldbus::{Link, LinkState, Role};
 use tickbus_net::Address;
@@ -30,16 +30,20 @@ const LOOK: Nanos = Nanos::from_millis(20);
 pub(super) struct Hosting {
     /// Use this address instead of the one in FILE.
     #[arg(long, value_name = "HOST:PORT")]
-    address: Option<String>,
+    pub(super) address: Option<String>,
 
     /// Inject the faults in the `[[fault]]` sections of this file.
     #[arg(long, value_name = "FILE")]
-    faults: Option<std::path::PathBuf>,
+    pub(super) faults: Option<std::path::PathBuf>,
 
     /// Serve the live page, and print its address; without HOST:PORT, at the address in the page table of FILE, or at
     /// 127.0.0.1:20080.
     #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = "", value_parser = page_address)]
-    page: Option<PageAddress>,
+    pub(super) page: Option<PageAddress>,
+
+    /// Let the page edit FILE, and the line take its changes; serves the page as --page does. On this computer alone.
+    #[arg(long)]
+    pub(super) edit: bool,
 
     /// Stop after this time [default: at Ctrl-C].
     #[arg(long, value_name = "TIME", value_parser = span)]
@@ -47,7 +51,7 @@ pub(super) struct Hosting {
 
     /// Record every scan to this file: a name ending in .vcd or .csv.
     #[arg(long, value_name = "FILE")]
-    record: Option<PathBuf>,
+    pub(super) record: Option<PathBuf>,
 
     /// Print statistics at the end, and every INTERVAL if one is given (--stats=1s).
     #[arg(long, value_name = "INTERVAL", num_args = 0..=1, require_equals = false,
@@ -135,72 +139,14 @@ pub(super) struct Job<'a> {
     pub(super) interval: Nanos,
 }
 
-/// Reads the driver.cfg, with what the command line asks for.
-fn configure(job: &Job<'_>, arguments: &Hosting) -> Result<Config, Outcome> {
-    let (title, format) = (job.title, &arguments.format);
-    let asked = CommandLineEnd {
-        role: job.role,
-        moved: arguments.address.is_some(),
-    };
-    let mut config = match Config::load_as(job.file, Some(asked), job.kinds) {
-        Ok(config) => config,
-        Err(mistakes) => return Err(format.refuse(title, &mistakes)),
-    };
-    if let Some(kind) = job.bus {
-        config = match on_bus(config, kind) {
-            Ok(config) => config,
-            Err(mistakes) => return Err(format.refuse(title, &mistakes)),
-        };
-    }
-    if let Some(address) = &arguments.address
-        && let Err(error) = config.bus.set_address(address)
-    {
-        let reason = format!("--address: {error} (the bus is \"{}\")", config.bus.kind());
-        return Err(format.fail(title, &reason, Outcome::WrongInput));
-    }
-    if let Some(file) = &arguments.faults
-        && let Err(mistakes) = config.add_faults(file)
-    {
-        return Err(format.refuse(title, &mistakes));
-    }
-    if !job.has_replies {
-        config.replies.clear();
-    }
-    // The [record] table belongs to the simulation, which may run at the other end of the same line. An observer has
-    // its own.
-    let own = (config.record.take()).filter(|_| job.role == Role::Observer);
-    config.record = match arguments.record.as_deref().map(recording).transpose() {
-        Ok(record) => record.or(own),
-        Err(error) => {
-            return Err(format.fail(title, &format!("--record: {error}"), Outcome::WrongInput));
-        }
-    };
-    if let Some(page) = &arguments.page {
-        page.ask(&mut config);
-    }
-    Ok(config)
-}
-
-/// Keys that a kind of bus needs, with the value for a machine of which nobody need be kept away.
-const NEEDED: &[(&str, &str)] = &[("opcua-server", "anonymous = true\n")];
-
-/// Returns the same driver on a bus of this kind with its defaults, and with its own page.
-fn on_bus(mut config: Config, kind: &str) -> Result<Config, Mistakes> {
-    let page = config.page.take();
-    let needed = NEEDED.iter().find(|(known, _)| *known == kind);
-    let needed = needed.map_or("", |(_, keys)| keys);
-    let text = format!("[fieldbus]\nkind = {}\n{needed}", json!(kind));
-    let mut config = config.overlaid("--bus", &text)?;
-    config.page = page;
-    Ok(config)
-}
-
 /// Reads the driver.cfg, hosts the program, and reports on stdout.
 pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
     let (title, format) = (job.title, &arguments.format);
-    let config = match configure(&job, arguments) {
+    let reading = Reading::new(&job, arguments);
+    let config = match reading.read() {
         Ok(config) => config,
-        Err(outcome) => return outcome,
+        Err(Wrong::Mistakes(mistakes)) => return format.refuse(title, &mistakes),
+        Err(Wrong::Argument(reason)) => return format.fail(title, &reason, Outcome::WrongInput),
     };
     let stop = Stop::new();
     if let Err(error) = ctrlc::set_handler({
@@ -222,7 +168,15 @@ pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
     let announce = |url: &str| {
         let _ = arguments.say(&format!("{title}: page at {url}\n"));
     };
-    let _place = match page::show(&config, || host.watch(), announce) {
+    let shown = Shown {
+        config: &config,
+        watch: || host.watch(),
+        line: host.line(),
+        read: Some(Box::new(move || {
+            reading.read().map_err(|wrong| wrong.to_string())
+        })),
+    };
+    let _place = match page::show(shown, announce) {
         Ok(place) => place,
         Err(error) => {
             let outcome = outcome_of(error.is_wrong_input());
@@ -295,7 +249,13 @@ pub(super) fn show(
     config: &Config,
     watch: impl FnOnce() -> Option<Watch>,
 ) -> Result<Option<Place>, Outcome> {
-    page::show(config, watch, announce(title)).map_err(|error| not_shown(title, &error))
+    let shown = Shown {
+        config,
+        watch,
+        line: None,
+        read: None,
+    };
+    page::show(shown, announce(title)).map_err(|error| not_shown(title, &error))
 }
 
 /// Shows a run on virtual time on the page and prints the address.

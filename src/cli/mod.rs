@@ -39,6 +39,7 @@ mod plc;
 mod plugin_helper;
 mod profibus;
 mod progress;
+mod reading;
 mod report;
 mod run;
 mod schema;

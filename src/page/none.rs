@@ -1,11 +1,10 @@
 //! A build without pages.
 
 use tickbus_driver::Watch;
-use tickbus_driver_cfg::Config;
 use tickbus_net::Address;
 use tickbus_virtual_time::Controls;
 
-use super::PageError;
+use super::{PageError, Shown};
 
 /// The place of a driver on the page; without pages there is none.
 #[derive(Debug)]
@@ -13,10 +12,15 @@ pub(crate) enum Place {}
 
 /// Does nothing, unless the driver.cfg asks for a page, which is an error.
 pub(crate) fn show(
-    config: &Config,
-    _watch: impl FnOnce() -> Option<Watch>,
+    shown: Shown<'_, impl FnOnce() -> Option<Watch>>,
     _announce: impl FnOnce(&str),
 ) -> Result<Option<Place>, PageError> {
+    let Shown {
+        config,
+        watch: _,
+        line: _,
+        read: _,
+    } = shown;
     if config.page.is_none() {
         return Ok(None);
     }

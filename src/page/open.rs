@@ -5,15 +5,16 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
 use tickbus_base::time::Monotonic;
-use tickbus_driver::Watch;
+use tickbus_driver::{Line, Watch};
 use tickbus_driver_cfg::Config;
 use tickbus_live_page::picture::{self, Picture};
 use tickbus_live_page::{LivePage, Member, Options};
 use tickbus_net::Address;
+use tickbus_studio::{Running, Seat, Studios};
 use tickbus_virtual_time::Controls;
 use tickbus_web::{Limits, Room, Serving};
 
-use super::PageError;
+use super::{PageError, Read, Shown};
 
 /// The page of this process, if there is one.
 static PAGE: Mutex<Weak<Open>> = Mutex::new(Weak::new());
@@ -27,6 +28,9 @@ struct Open {
     // Dropped in this order, so that nobody asks a page that has ended.
     _serving: Serving,
     page: LivePage,
+    studios: Studios,
+    /// True if only this computer reaches the page.
+    is_here: bool,
     url: String,
     /// The address that the first driver asked for.
     asked: Address,
@@ -35,6 +39,7 @@ struct Open {
 /// The place of a driver or a run on the page.
 #[derive(Debug)]
 pub(crate) struct Place {
+    seat: Option<Seat>,
     member: Option<Member>,
     open: Option<Arc<Open>>,
 }
@@ -43,6 +48,7 @@ impl Drop for Place {
     fn drop(&mut self) {
         // Locked so that nobody asks for the address while it is being released.
         let present = present();
+        self.seat = None;
         self.member = None;
         self.open = None;
         drop(present);
@@ -62,10 +68,10 @@ pub(crate) fn url() -> Option<String> {
 /// Shows the views of `watch` on the page, if the driver.cfg asks for one. `announce` receives the address of a new
 /// page.
 pub(crate) fn show(
-    config: &Config,
-    watch: impl FnOnce() -> Option<Watch>,
+    shown: Shown<'_, impl FnOnce() -> Option<Watch>>,
     announce: impl FnOnce(&str),
 ) -> Result<Option<Place>, PageError> {
+    let config = shown.config;
     let Some(wanted) = &config.page else {
         return Ok(None);
     };
@@ -79,13 +85,47 @@ pub(crate) fn show(
         token.as_deref(),
         announce,
     )?;
-    let Some(watch) = watch() else {
+    let Some(watch) = (shown.watch)() else {
         return Ok(None);
     };
+    let present = Arc::clone(watch.config());
+    let member = open.page.join(watch, options);
+    let seat = match shown.read.filter(|_| wanted.edit) {
+        Some(read) => Some(open.edit(&member, present, (shown.line, read))?),
+        None => None,
+    };
     Ok(Some(Place {
-        member: Some(open.page.join(watch, options)),
+        seat,
+        member: Some(member),
         open: Some(open),
     }))
+}
+
+impl Open {
+    /// Opens the studio of a driver.
+    fn edit(
+        &self,
+        member: &Member,
+        config: Arc<Config>,
+        (line, read): (Option<Line>, Read),
+    ) -> Result<Seat, PageError> {
+        let file = config.path.display().to_string();
+        if !self.is_here {
+            return Err(PageError::WrongInput(format!(
+                "{file}: the page of this process is served on {}, and other computers must not edit this file; listen \
+                 on 127.0.0.1, or remove \"edit\"",
+                self.asked
+            )));
+        }
+        let running = Running {
+            kinds: config.kinds,
+            config,
+            line,
+            read,
+        };
+        let seat = self.studios.join(member.id(), running);
+        seat.map_err(|why| PageError::WrongInput(format!("{file} cannot be edited: {why}")))
+    }
 }
 
 /// Returns what the page is asked for: the picture, and how long signals stay forced.
@@ -108,6 +148,7 @@ pub(crate) fn show_run(
 ) -> Result<Place, PageError> {
     let open = open(name, (listen, "--page 127.0.0.1:0"), None, announce)?;
     Ok(Place {
+        seat: None,
         member: Some(open.page.join_run(name, controls)),
         open: Some(open),
     })
@@ -144,10 +185,14 @@ fn open(
     }
     let url = room.url();
     let page = LivePage::open(Monotonic::shared()).map_err(refused)?;
-    let serving = room.serve(page.site(), Monotonic::shared());
+    let studios = Studios::beside(page.site());
+    let is_here = room.address().ip().is_loopback();
+    let serving = room.serve(studios.site(), Monotonic::shared());
     let open = Arc::new(Open {
         _serving: serving.map_err(refused)?,
         page,
+        studios,
+        is_here,
         url,
         asked: asked.clone(),
     });

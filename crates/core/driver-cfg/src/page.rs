@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Key, Shape, Table, Value};
-use tickbus_net::Address;
+use tickbus_net::{Address, Host};
 
 /// The default port of a page.
 const PORT: u16 = 20080;
@@ -48,6 +48,12 @@ pub(crate) const KEYS: &[Key] = &[
         Shape::Label(PATH_LIMIT),
         "The file in which the token survives a restart, relative to the folder of this file",
     ),
+    Key::new(
+        "edit",
+        Shape::Boolean,
+        "true: the page edits this file, and the line takes its changes; on this computer alone",
+    )
+    .or("false"),
 ];
 
 /// The live page of a driver.
@@ -61,6 +67,8 @@ pub struct PageOptions {
     pub picture: Option<PathBuf>,
     /// The file that keeps the page's token across restarts, relative to the folder of the driver.cfg.
     pub token_file: Option<PathBuf>,
+    /// True if the page edits the driver.cfg; the page then listens [on this computer alone](Self::listens_here).
+    pub edit: bool,
 }
 
 impl Default for PageOptions {
@@ -71,14 +79,22 @@ impl Default for PageOptions {
             grace: Some(GRACE),
             picture: None,
             token_file: None,
+            edit: false,
         }
     }
 }
 
 impl PageOptions {
     pub(super) fn read(mut table: Table<'_>) -> Option<Self> {
-        let [listen, grace, keep_forced, picture, token_file] =
-            ["listen", "grace", "keep_forced", "picture", "token_file"].map(|key| table.take(key));
+        let [listen, grace, keep_forced, picture, token_file, edit] = [
+            "listen",
+            "grace",
+            "keep_forced",
+            "picture",
+            "token_file",
+            "edit",
+        ]
+        .map(|key| table.take(key));
         table.finish();
         let usual = Self::default();
         let listen = listen.map_or(Some(usual.listen), |value| Address::read(&value));
@@ -113,13 +129,25 @@ impl PageOptions {
             let right = "name a file, such as \"page.token\"; it is made";
             value.label(PATH_LIMIT, right).map(PathBuf::from)
         });
+        let edits = edit.as_ref().map_or(Some(false), Value::boolean);
+        let listen = listen?;
+        if let (Some(value), Some(true)) = (&edit, edits)
+            && !Self::is_here(&listen)
+        {
+            value.wrong(
+                format!("this page is served on {listen}, and other computers must not edit this file"),
+                "listen on 127.0.0.1, and let others in by a tunnel (ssh -L), or remove \"edit\": a driver.cfg names \
+                 libraries, which run as you",
+            );
+            return None;
+        }
         let grace = match (keeps?, stated) {
             (true, _) => None,
             (false, None) => usual.grace,
             (false, Some(stated)) => Some(stated?),
         };
         Some(Self {
-            listen: listen?,
+            listen,
             grace,
             picture: match picture {
                 None => None,
@@ -129,7 +157,20 @@ impl PageOptions {
                 None => None,
                 Some(file) => Some(file?),
             },
+            edit: edits?,
         })
+    }
+
+    /// Returns true if the page listens on this computer alone.
+    pub fn listens_here(&self) -> bool {
+        Self::is_here(&self.listen)
+    }
+
+    fn is_here(listen: &Address) -> bool {
+        match &listen.host {
+            Host::Ip(ip) => ip.is_loopback(),
+            Host::Name(name) => name.eq_ignore_ascii_case("localhost"),
+        }
     }
 }
 
@@ -162,6 +203,11 @@ mod tests {
         assert_eq!(page.grace, Some(Nanos::from_secs(60)));
         assert_eq!(page.picture, Some(PathBuf::from("pictures/rig.svg")));
         assert_eq!(page.token_file, Some(PathBuf::from("page.token")));
+        assert!(!page.edit);
+        for listen in ["127.0.0.1:0", "[::1]:0", "localhost:0"] {
+            let page = read(&format!("[page]\nlisten = \"{listen}\"\nedit = true\n"));
+            assert!(page.expect("right").expect("there").edit, "{listen}");
+        }
         let keeps = read("[page]\nkeep_forced = true\n").expect("right");
         assert_eq!(keeps.expect("there").grace, None);
     }
@@ -178,6 +224,15 @@ mod tests {
                 "have no \"grace\"",
             ),
             ("[page]\nkeep_forced = 1\n", "driver.cfg:11:15: "),
+            ("[page]\nedit = 1\n", "driver.cfg:11:8: "),
+            (
+                "[page]\nlisten = \"0.0.0.0:0\"\nedit = true\n",
+                "driver.cfg:12:8: this page is served on 0.0.0.0:0, and other computers",
+            ),
+            (
+                "[page]\nlisten = \"labpc:80\"\nedit = true\n",
+                "other computers",
+            ),
             ("[page]\npicture = \"rig.png\"\n", "does not end in .svg"),
             (
                 "[page]\npictures = \"rig.svg\"\n",

@@ -24,6 +24,12 @@ pub(crate) const ASSETS: &[Asset] = &[
     },
     script("/stream.js", tickbus_web::STREAM),
     script("/client.js", tickbus_web::CLIENT),
+    script("/tabs.js", tickbus_web::TABS),
+    Asset {
+        path: "/tabs.css",
+        kind: STYLE,
+        text: tickbus_web::TABS_STYLE,
+    },
     script("/lookup.js", tickbus_report::LOOKUP),
     script("/draw.js", tickbus_report::DRAW),
     script("/signals.js", include_str!("signals.js")),

@@ -226,6 +226,7 @@
       show(get("access"), mayForce ? "may force" : "read-only");
       get("access").classList.toggle("good", mayForce);
       document.body.classList.toggle("read-only", !mayForce);
+      if (mayForce) tabs.show();
       if (refusal) say(`Read-only: ${refusal}`);
       else if (get("status").textContent.startsWith("Read-only")) say("");
       get("access").title = mayForce ? "Signals can be forced from this page" : "Open the address that was printed, with its token, to force a signal";

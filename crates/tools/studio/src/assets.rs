@@ -28,6 +28,11 @@ const OWN: &[Asset] = &[
         text: include_str!("cells.js"),
     },
     Asset {
+        path: "/running.js",
+        kind: SCRIPT,
+        text: include_str!("running.js"),
+    },
+    Asset {
         path: "/explore.js",
         kind: SCRIPT,
         text: include_str!("explore.js"),

@@ -5,6 +5,7 @@
 //! undone. A file that another program changes meanwhile is read again; nothing of it is overwritten.
 
 mod assets;
+mod beside;
 mod check;
 mod desk;
 mod edit;
@@ -16,12 +17,17 @@ mod line;
 mod literal;
 mod places;
 mod propose;
+mod running;
 mod sheet;
 mod site;
 mod tags;
 
 #[cfg(test)]
+mod running_tests;
+#[cfg(test)]
 mod tests;
 
+pub use beside::{Seat, Studios};
 pub use line::{Machine, Opened};
+pub use running::{Read, Running};
 pub use site::{Settings, Studio, Unsaved};

@@ -2,7 +2,7 @@
 
 use std::fmt;
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use serde_json::json;
@@ -18,9 +18,14 @@ use crate::edit::Edit;
 use crate::explore::{Explored, look_along, search, targets};
 use crate::file::keep;
 use crate::line::{Line, Machine};
+use crate::running::{Asked, Running};
 
 /// The largest body of an edit: the whole text of a file, or a list of tags in base64.
 const BODY: usize = 96 << 20;
+
+/// Why the studio neither starts nor stops a line, nor examines it.
+const OWNED: &str =
+    "the simulation owns this line; let it take the changes, or stop the simulation";
 
 /// The settings of a studio.
 pub struct Settings {
@@ -42,10 +47,20 @@ impl fmt::Debug for Settings {
 #[derive(Debug)]
 pub struct Studio(Arc<Shared>);
 
+/// Whose the line is.
+enum Owner {
+    /// The studio's, which starts and stops it.
+    Studio {
+        machine: Machine,
+        page: Box<LivePage>,
+    },
+    /// That of a simulation, which runs already.
+    Simulation(Running),
+}
+
 struct Shared {
     kinds: &'static Kinds,
-    machine: Machine,
-    page: LivePage,
+    owner: Owner,
     live: Arc<dyn Site>,
     state: Mutex<Room>,
 }
@@ -67,6 +82,8 @@ struct Room {
     refused_at: u64,
     /// The version of the file with which the line was started.
     started: u64,
+    /// The versions at which a simulation's line was compared with the file, and the result.
+    asked: Option<((u64, u64), Asked)>,
     explored: Explored,
 }
 
@@ -88,22 +105,44 @@ impl Studio {
     ///
     /// The file cannot be read, or the system has no thread.
     pub fn open(settings: Settings) -> Result<Self, String> {
-        let desk = Desk::open(&settings.path, settings.kinds)?;
         let page = LivePage::open(Monotonic::shared()).map_err(|error| error.to_string())?;
         let live = page.site();
+        let owner = Owner::Studio {
+            machine: settings.machine,
+            page: Box::new(page),
+        };
+        Self::of(&settings.path, settings.kinds, owner, live)
+    }
+
+    /// Reads the file of a driver that runs, which the live page shows.
+    ///
+    /// # Errors
+    ///
+    /// The file cannot be read.
+    pub(crate) fn of_running(running: Running, live: Arc<dyn Site>) -> Result<Self, String> {
+        let (path, kinds) = (running.path(), running.kinds);
+        Self::of(&path, kinds, Owner::Simulation(running), live)
+    }
+
+    fn of(
+        path: &Path,
+        kinds: &'static Kinds,
+        owner: Owner,
+        live: Arc<dyn Site>,
+    ) -> Result<Self, String> {
         let room = Room {
-            desk,
+            desk: Desk::open(path, kinds)?,
             line: None,
             turns: 0,
             refused: String::new(),
             refused_at: 0,
             started: 0,
+            asked: None,
             explored: Explored::default(),
         };
         Ok(Self(Arc::new(Shared {
-            kinds: settings.kinds,
-            machine: settings.machine,
-            page,
+            kinds,
+            owner,
             live,
             state: Mutex::new(room),
         })))
@@ -112,6 +151,18 @@ impl Studio {
     /// The site that the room serves.
     pub fn site(&self) -> Arc<dyn Site> {
         Arc::new(StudioSite(Arc::clone(&self.0)))
+    }
+
+    /// The state that the page shows, or its number alone if `seen` is that.
+    #[cfg(test)]
+    pub(crate) fn state(&self, seen: &str) -> String {
+        self.0.state(seen)
+    }
+
+    /// Makes a change as the page requests it.
+    #[cfg(test)]
+    pub(crate) fn change(&self, change: &Change) -> Result<(), Refusal> {
+        self.0.change(change)
     }
 
     /// Starts the line, as the page does.
@@ -147,7 +198,31 @@ impl Shared {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Gives the line of a simulation the settings of the file.
+    fn take(&self) -> Result<(), Refusal> {
+        let Owner::Simulation(running) = &self.owner else {
+            let why = "the line here is the studio's own; start it again";
+            return Err((409, why.to_owned()));
+        };
+        let mut room = self.room();
+        room.desk.look();
+        room.refused_at = room.desk.version();
+        room.turns += 1;
+        room.refused.clear();
+        let taken = match room.desk.unsaved() {
+            Some((_, why)) => Err(format!(
+                "the file could not be written ({why}), and the line takes only what the file has"
+            )),
+            None => running.take(),
+        };
+        room.refused = taken.as_ref().err().cloned().unwrap_or_default();
+        taken.map_err(|why| (409, why))
+    }
+
     fn start(&self) -> Result<(), Refusal> {
+        let Owner::Studio { machine, page } = &self.owner else {
+            return Err((409, OWNED.to_owned()));
+        };
         let mut room = self.room();
         room.desk.look();
         room.refused_at = room.desk.version();
@@ -167,7 +242,7 @@ impl Shared {
             room.refused.clone_from(&text);
             return Err((409, text));
         }
-        match Line::open(room.desk.path(), self.kinds, &self.machine, &self.page) {
+        match Line::open(room.desk.path(), self.kinds, machine, page) {
             Ok(line) => {
                 room.line = Some(line);
                 room.started = room.desk.version();
@@ -250,11 +325,22 @@ impl Shared {
         let mut state = room.desk.json();
         state["state"] = json!(version);
         state["explored"] = room.explored.json();
-        state["line"] = json!({
-            "runs": room.line.is_some(),
-            "refused": room.refused,
-            "isOld": room.line.is_some() && room.started != room.desk.version(),
-        });
+        state["line"] = match &self.owner {
+            Owner::Studio { .. } => json!({
+                "runs": room.line.is_some(),
+                "refused": room.refused,
+                "isOld": room.line.is_some() && room.started != room.desk.version(),
+            }),
+            Owner::Simulation(running) => {
+                let now = (room.desk.version(), room.turns);
+                let known = room.asked.take().filter(|(at, _)| *at == now);
+                let (_, asked) = room
+                    .asked
+                    .insert(known.unwrap_or_else(|| (now, running.asked())));
+                let asked = asked.clone();
+                running.json(&asked, &room.refused)
+            }
+        };
         state.to_string()
     }
 
@@ -295,11 +381,15 @@ impl Shared {
                 Ok(())
             }
             ("line", "start") => self.start(),
-            ("line", "stop") => {
-                self.stop();
-                Ok(())
-            }
-            ("line", _) => Err((400, "write start or stop".to_owned())),
+            ("line", "take") => self.take(),
+            ("line", "stop") => match self.owner {
+                Owner::Simulation(_) => Err((409, OWNED.to_owned())),
+                Owner::Studio { .. } => {
+                    self.stop();
+                    Ok(())
+                }
+            },
+            ("line", _) => Err((400, "write start, stop or take".to_owned())),
             _ => Err(none()),
         }
     }
@@ -366,6 +456,12 @@ impl Site for StudioSite {
         if let Some(seen) = path.strip_prefix("/studio/state/") {
             let seen = seen.to_owned();
             self.apart(answer, move |shared| json(shared.state(&seen)));
+        } else if path == "/tabs" {
+            let tabs = json!([
+                { "path": "/", "name": "Live page" },
+                { "path": "/studio", "name": "Studio" },
+            ]);
+            answer.give(json(tabs.to_string()));
         } else if path == "/studio/schema" {
             self.apart(answer, move |shared| {
                 json(tickbus_schema::schema(shared.kinds).to_string())
@@ -385,6 +481,9 @@ impl Site for StudioSite {
             return;
         }
         let asked = match change.path.as_str() {
+            "/studio/examine" if matches!(self.0.owner, Owner::Simulation(_)) => {
+                Some(Err((409, OWNED.to_owned())))
+            }
             "/studio/examine" => Some(self.0.begin("examine").map(|stop| (Vec::new(), stop))),
             "/studio/find" => Some(
                 targets(&change.body)

@@ -36,7 +36,7 @@
 
   async function ask() {
     try {
-      const answer = await room.ask(`/studio/state/${seen}`, {});
+      const answer = await room.ask(`${running.base}/state/${seen}`, {});
       if (answer.ok) {
         const state = await answer.json();
         if (state.state !== seen) take(state);
@@ -139,7 +139,7 @@
 
   /** The lamp: what the machine's end of the line says of itself. */
   function showLine() {
-    const [driver] = plant.drivers;
+    const driver = running.mine(plant.drivers);
     const line = driver?.line;
     const runs = file?.line.runs ?? false;
     get("start").textContent = runs ? (file.line.isOld ? "Restart with the changes" : "Restart") : "Start";
@@ -159,6 +159,8 @@
     } else if (file?.checked.mistakes.length) {
       reason = "Correct the mistakes, and then start.";
     }
+    running.show(file?.line, mayEdit, file?.checked.mistakes.length ?? 1);
+    if (file?.line.owner && file.line.refused) reason = `${file.line.refused}\n${reason}`;
     get("lamp").className = lamp;
     if (get("line-state").textContent !== state) get("line-state").textContent = state;
     if (get("line-reason").textContent !== reason) get("line-reason").textContent = reason;
@@ -166,7 +168,7 @@
 
   function showValues() {
     const values = new Map();
-    for (const signal of plant.drivers[0]?.signals ?? []) values.set(signal.name, { text: `${words.value(signal)}${signal.unit ? ` ${signal.unit}` : ""}`, isStale: signal.isStale });
+    for (const signal of running.mine(plant.drivers)?.signals ?? []) values.set(signal.name, { text: `${words.value(signal)}${signal.unit ? ` ${signal.unit}` : ""}`, isStale: signal.isStale });
     cells.values(values);
   }
 
@@ -177,7 +179,7 @@
   /** Requests a change of the file, and reads what came of it. */
   async function change(path, body = "") {
     changes += 1;
-    const request = last.then(() => room.change("PUT", `/studio/${path}`, body));
+    const request = last.then(() => room.change("PUT", `${running.base}/${path}`, body));
     last = request.catch(() => {});
     const answer = await request;
     if (!answer?.ok) {
@@ -265,6 +267,7 @@
   get("redo").addEventListener("click", () => change("redo"));
   get("start").addEventListener("click", () => change("line", "start"));
   get("stop").addEventListener("click", () => change("line", "stop"));
+  get("take").addEventListener("click", () => change("line", "take"));
   get("add-input").addEventListener("click", () => add("I"));
   get("add-output").addEventListener("click", () => add("Q"));
   get("remove").addEventListener("click", () => {
@@ -326,8 +329,9 @@
       mayEdit = isRight;
       document.body.classList.toggle("read-only", !mayEdit);
       if (!isRight) return say(refusal || "Open the address that was printed, with its token: without it the studio shows nothing.", true);
+      tabs.show();
       if (!file) {
-        const answer = await room.ask("/studio/schema", {});
+        const answer = await room.ask(`${running.base}/schema`, {});
         bus.begin(await answer.json(), { set });
       }
       await read();

@@ -18,7 +18,7 @@ const room = (() => {
     const given = /^#token=([0-9a-f]+)$/.exec(location.hash);
     if (!given) return;
     sessionStorage.setItem("token", given[1]);
-    history.replaceState(null, "", location.pathname);
+    history.replaceState(null, "", location.pathname + location.search);
   }
 
   function headers() {

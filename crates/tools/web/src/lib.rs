@@ -24,3 +24,10 @@ pub const CLIENT: &str = include_str!("client.js");
 
 /// The script that reads the events, as a worker for all tabs of a browser; `client.js` expects it at `/stream.js`.
 pub const STREAM: &str = include_str!("stream.js");
+
+/// The script that shows the pages of a room as tabs, in the element `tabs` of each page; it asks for `/tabs`, a list of
+/// paths and names.
+pub const TABS: &str = include_str!("tabs.js");
+
+/// The style of these tabs.
+pub const TABS_STYLE: &str = include_str!("tabs.css");

@@ -1,0 +1,33 @@
+"use strict";
+
+// A line that a simulation owns: it takes the changes of the file, and what it cannot take is said before.
+
+const running = (() => {
+  const get = (id) => document.getElementById(id);
+
+  /** Where the requests for the file go: a room with several drivers has the number of the driver in the page's address. */
+  const driver = new URLSearchParams(location.search).get("driver");
+  const base = driver ? `/studio/of/${encodeURIComponent(driver)}` : "/studio";
+
+  /** The driver of this file, of those on the live page. */
+  const mine = (drivers) => (driver ? drivers.find(({ id }) => String(id) === driver) : drivers[0]);
+
+  /** Shows what the line can take of the file; does nothing for a line of the studio's own. */
+  function show(line, mayEdit, mistakes) {
+    const owner = line?.owner;
+    document.body.classList.toggle("is-owned", owner !== undefined);
+    if (!owner) return;
+    const restart = owner.restart;
+    get("take").disabled = !mayEdit || !line.isOld || restart.length > 0 || mistakes > 0;
+    let told = "The line has the settings of the file.";
+    if (mistakes > 0) told = "The file has mistakes; the line keeps its settings.";
+    else if (restart.length > 0) told = "The simulation must be restarted for these changes; the line keeps its settings:";
+    else if (line.isOld) told = "The file has other settings than the line.";
+    if (get("taken").textContent !== told) get("taken").textContent = told;
+    const items = mistakes > 0 ? [] : restart;
+    get("restart").hidden = items.length === 0;
+    get("restart").replaceChildren(...items.map((text) => Object.assign(document.createElement("li"), { textContent: text })));
+  }
+
+  return { base, mine, show };
+})();

@@ -79,12 +79,7 @@ pub(crate) fn show(
     let any = "listen = \"127.0.0.1:0\" in [page], or --page 127.0.0.1:0,";
     let token = wanted.token_file.as_ref();
     let token = token.map(|file| config.folder().join(file));
-    let open = open(
-        &config.name,
-        (&wanted.listen, any),
-        token.as_deref(),
-        announce,
-    )?;
+    let (open, is_new) = open(&config.name, (&wanted.listen, any), token.as_deref())?;
     let Some(watch) = (shown.watch)() else {
         return Ok(None);
     };
@@ -94,6 +89,10 @@ pub(crate) fn show(
         Some(read) => Some(open.edit(&member, present, (shown.line, read))?),
         None => None,
     };
+    // Whoever opens the page finds the driver there.
+    if is_new {
+        announce(&open.url);
+    }
     Ok(Some(Place {
         seat,
         member: Some(member),
@@ -146,22 +145,25 @@ pub(crate) fn show_run(
     controls: Controls,
     announce: impl FnOnce(&str),
 ) -> Result<Place, PageError> {
-    let open = open(name, (listen, "--page 127.0.0.1:0"), None, announce)?;
+    let (open, is_new) = open(name, (listen, "--page 127.0.0.1:0"), None)?;
+    let member = open.page.join_run(name, controls);
+    if is_new {
+        announce(&open.url);
+    }
     Ok(Place {
         seat: None,
-        member: Some(open.page.join_run(name, controls)),
+        member: Some(member),
         open: Some(open),
     })
 }
 
-/// Returns the present page, or a new one at `asked`; `any` is the setting for a port that the system chooses, for the
+/// Returns the present page, or a new one at `asked`, and whether it is new; `any` is the setting for a port that the system chooses, for the
 /// error message.
 fn open(
     name: &str,
     (asked, any): (&Address, &str),
     token_file: Option<&Path>,
-    announce: impl FnOnce(&str),
-) -> Result<Arc<Open>, PageError> {
+) -> Result<(Arc<Open>, bool), PageError> {
     let mut present = present();
     if let Some(open) = present.upgrade() {
         if open.asked != *asked {
@@ -170,7 +172,7 @@ fn open(
                 open.asked
             );
         }
-        return Ok(open);
+        return Ok((open, false));
     }
     let refused = |error: std::io::Error| {
         PageError::NotServed(format!(
@@ -200,8 +202,7 @@ fn open(
     // Readers of the log must not be able to force signals: only whoever started this process gets the token.
     let (plain, _) = open.url.split_once('#').unwrap_or((&open.url, ""));
     log::info!("the live page is at {plain}");
-    announce(&open.url);
-    Ok(open)
+    Ok((open, true))
 }
 
 /// Reads the picture of a driver. Mistakes in it are logged, and the rest of the picture works.

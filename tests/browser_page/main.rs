@@ -9,9 +9,14 @@
 #[allow(dead_code, reason = "the report's tests use the rest")]
 mod webdriver;
 
+#[path = "../peers/commands.rs"]
+mod commands;
+#[path = "../peers/edited.rs"]
+mod edited;
 mod live;
 mod run;
 mod studio;
+mod taken;
 
 use std::io::{BufRead as _, BufReader, Lines, Write as _};
 use std::net::TcpStream;

@@ -71,7 +71,7 @@ fn open(studio: &Studio, width: u32, height: u32) -> Browser {
 }
 
 /// The file is shown.
-const READY: &str = "document.querySelector('#settings select') !== null";
+pub(crate) const READY: &str = "document.querySelector('#settings select') !== null";
 
 /// Types into a cell, by keys alone.
 fn fill(browser: &Browser, row: usize, key: &str, text: &str) {
@@ -89,7 +89,7 @@ fn wait_cell(browser: &Browser, row: usize, key: &str, text: &str) {
 }
 
 /// Types into a setting of the bus or the driver.
-fn set(browser: &Browser, id: &str, text: &str) {
+pub(crate) fn set(browser: &Browser, id: &str, text: &str) {
     browser.run(&format!(
         "const f = document.getElementById({}); f.focus(); f.select();",
         json!(id)
@@ -114,7 +114,7 @@ fn choose_kind(browser: &Browser, kind: &str) {
     ));
 }
 
-fn wait_line(browser: &Browser, words: &str) -> String {
+pub(crate) fn wait_line(browser: &Browser, words: &str) -> String {
     browser.wait(&format!(
         "`${{document.getElementById('line-state').textContent}} ${{document.getElementById('line-reason').textContent}}`.includes({})",
         json!(words)

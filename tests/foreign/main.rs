@@ -11,6 +11,9 @@ mod bridge_bus;
 mod commands;
 mod devices;
 mod doctor;
+#[cfg(all(unix, feature = "page"))]
+#[path = "../peers/edited.rs"]
+mod edited;
 #[path = "../it/fmi/fixture.rs"]
 mod fixture;
 mod fmi;
@@ -49,6 +52,8 @@ mod schema;
 mod second_ivi;
 mod silkit;
 mod st;
+#[cfg(all(unix, feature = "page"))]
+mod taken;
 mod vcd;
 
 use std::process::ExitCode;
@@ -86,6 +91,8 @@ fn main() -> ExitCode {
         ("page", page::TESTS),
         #[cfg(feature = "page")]
         ("metrics", metrics::TESTS),
+        #[cfg(all(unix, feature = "page"))]
+        ("taken", taken::TESTS),
         ("gateway", gateway::TESTS),
         ("helics", helics::TESTS),
         ("silkit", silkit::TESTS),

@@ -50,13 +50,13 @@ pub(crate) fn free_port() -> u16 {
 }
 
 /// A foreign server, which answers each line.
-struct Server {
+pub(crate) struct Server {
     child: Child,
     lines: Lines<BufReader<ChildStdout>>,
 }
 
 impl Server {
-    fn start(kind: &str, port: u16) -> Result<Self, Absent> {
+    pub(crate) fn start(kind: &str, port: u16) -> Result<Self, Absent> {
         let mut child = python(kind, "observed.py")?
             .arg(port.to_string())
             .stdin(Stdio::piped())
@@ -75,7 +75,7 @@ impl Server {
     }
 
     /// Lets the server obey a line; returns how often clients have written so far.
-    fn obey(&mut self, line: &str) -> u32 {
+    pub(crate) fn obey(&mut self, line: &str) -> u32 {
         let mut to = self.child.stdin.as_ref().expect("a pipe");
         writeln!(to, "{line}").expect("it listens");
         let told = self.line();

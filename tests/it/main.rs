@@ -13,6 +13,9 @@ mod commands;
 mod compare;
 mod dispatch;
 mod doctor;
+#[cfg(all(unix, feature = "page"))]
+#[path = "../peers/edited.rs"]
+mod edited;
 mod ending;
 mod export;
 mod exports;
@@ -35,4 +38,6 @@ mod report;
 mod sessions;
 mod sweep;
 mod sync;
+#[cfg(all(unix, feature = "page"))]
+mod taken;
 mod testing;

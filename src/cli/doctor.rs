@@ -62,7 +62,14 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
         watch: arguments.watch,
         wait: arguments.wait.unwrap_or_default(),
     };
-    let steps = examine(&config, terms, &clock, &Stop::new());
+    let stop = Stop::new();
+    let handler = {
+        let stop = stop.clone();
+        move || stop.stop()
+    };
+    // Without it Ctrl-C ends the examination without its steps so far.
+    let _ = ctrlc::set_handler(handler);
+    let steps = examine(&config, terms, &clock, &stop);
     let has_failed = steps.iter().any(|step| step.verdict == Verdict::Fail);
     let printed = if arguments.format.is_json() {
         print_document("doctor", document(&config, &steps))

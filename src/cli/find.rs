@@ -11,7 +11,7 @@ use super::{Outcome, print};
 use tickbus_base::time::{Clock, Monotonic, Stop};
 use tickbus_base::toml_text::{did_you_mean, shown};
 use tickbus_driver_cfg::Kinds;
-use tickbus_finder::{Device, Findings, Plan, Target, addresses, find};
+use tickbus_finder::{Device, Findings, Plan, RATE, Target, find};
 
 /// Find the PLCs on a network: Modbus TCP, S7 and OPC UA.
 ///
@@ -37,8 +37,12 @@ pub(super) struct Arguments {
     unit: Vec<u8>,
 
     /// Connect to this many addresses per second.
-    #[arg(long, value_name = "N", default_value_t = 500, value_parser = clap::value_parser!(u32).range(1..=2000))]
+    #[arg(long, value_name = "N", default_value_t = RATE, value_parser = clap::value_parser!(u32).range(1..=2000))]
     rate: u32,
+
+    /// Search for Modbus over UDP as well: up to three more packets per address.
+    #[arg(long)]
+    udp: bool,
 
     /// Print a `[fieldbus]` table for each device.
     #[arg(long, conflicts_with = "json")]
@@ -83,21 +87,18 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
     let searches: Vec<_> = searches
         .map(|search| (search, arguments.port.unwrap_or(search.port)))
         .collect();
-    let mut ports: Vec<u16> = searches.iter().map(|(_, port)| *port).collect();
-    ports.dedup();
-    let addresses = match addresses(&arguments.targets, &ports, &*clock, &stop) {
-        Ok(addresses) => addresses,
+    let plan = match Plan::of(&arguments.targets, searches, &*clock, &stop) {
+        Ok(plan) => Plan {
+            rate: arguments.rate,
+            units: arguments.unit.clone(),
+            udp: arguments.udp,
+            ..plan
+        },
         Err(error) => {
             return arguments
                 .format
                 .fail("find", &format!("find: {error}"), Outcome::WrongInput);
         }
-    };
-    let plan = Plan {
-        searches,
-        addresses,
-        rate: arguments.rate,
-        units: arguments.unit.clone(),
     };
     let findings = match find(&plan, &clock, &stop) {
         Ok(findings) => findings,
@@ -156,6 +157,12 @@ fn report(findings: &Findings, with_tables: bool) -> String {
         out.push_str(&aligned(&["address", "bus", "where", "identity"], &rows));
         out.push('\n');
     }
+    for device in &findings.devices {
+        for url in &device.found.named {
+            // Writing to a string cannot fail.
+            let _ = writeln!(out, "{} names {url}", device.address);
+        }
+    }
     if with_tables {
         for device in &findings.devices {
             // Writing to a string cannot fail.
@@ -196,6 +203,7 @@ fn document(findings: &Findings) -> Value {
             "identity": device.found.identity,
             "facts": facts.map(|(name, text)| ((*name).to_owned(), json!(text))).collect::<serde_json::Map<_, _>>(),
             "fieldbus": device.found.stanza,
+            "names": device.found.named,
         })
     });
     let swept = findings.swept;

@@ -1,7 +1,10 @@
 //! `tickbus doctor` names the true cause of prepared faults.
 
 mod dying;
+mod lines;
 pub(crate) mod peers;
+#[cfg(target_os = "linux")]
+mod serial;
 
 use std::net::SocketAddr;
 use std::path::Path;

@@ -121,15 +121,7 @@ impl BusOptions for ServerOptions {
     }
 
     fn examine(&self, examination: &mut Examination<'_>) {
-        match &self.line {
-            Line::Tcp(address) | Line::RtuOverTcp(address) => {
-                if examination.can_listen(address) {
-                    examination.sizes("the PLC asks for what it needs");
-                }
-            }
-            Line::Udp(_) => examination.unexamined("Modbus over UDP"),
-            Line::Serial(_) => examination.unexamined("a serial line"),
-        }
+        self.examine(examination);
     }
 
     fn complaints(&self) -> Option<&'static [Complaint]> {

@@ -45,6 +45,7 @@ pub mod mbap;
 mod piece;
 mod restricts;
 pub mod rtu;
+mod serial_settings;
 mod server;
 mod shown;
 mod stations;

@@ -10,6 +10,7 @@ pub(crate) const SEARCH: Search = Search {
     bus: "opcua",
     port: PORT,
     ask,
+    datagrams: None,
 };
 
 fn ask(searching: Searching<'_>) -> Vec<Found> {
@@ -20,14 +21,16 @@ fn ask(searching: Searching<'_>) -> Vec<Found> {
         Answer::Alien(_) | Answer::End(_) => return Vec::new(),
     }
     #[cfg(feature = "opcua")]
-    let (identity, facts, security) = super::client::found(&peer, &url);
+    let (identity, facts, security, named) = super::client::found(&peer, &url);
     #[cfg(not(feature = "opcua"))]
-    let (identity, facts, security) = (String::new(), Vec::new(), "Basic256Sha256");
+    let (identity, facts, security, named) =
+        (String::new(), Vec::new(), "Basic256Sha256", Vec::new());
     vec![Found {
         identity,
         facts,
         stanza: format!(
             "[fieldbus]\nkind     = \"opcua-client\"\nurl      = \"{url}\"\nsecurity = \"{security}\"\n"
         ),
+        named,
     }]
 }

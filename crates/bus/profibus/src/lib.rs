@@ -11,6 +11,7 @@ mod configuration;
 mod device;
 mod drive;
 mod event;
+mod examine;
 mod finder;
 mod gsd;
 mod layout;

@@ -12,6 +12,7 @@ use std::path::Path;
 use tickbus_base::Mistake;
 use tickbus_base::os::{Parity, SerialSettings};
 use tickbus_base::toml_text::{Collector, Key, Shape, Table, Value};
+use tickbus_fieldbus::examine::Examination;
 use tickbus_fieldbus::{
     At, Bus, BusKind, BusOptions, BusSetup, NamedFile, OBSERVES, OpenError, Role,
 };
@@ -188,6 +189,10 @@ impl BusOptions for Options {
         } else {
             Box::new(ProfibusDevice::new(&self.line, stations))
         }))
+    }
+
+    fn examine(&self, examination: &mut Examination<'_>) {
+        self.examine_line(examination);
     }
 
     fn has_diagnosis(&self) -> bool {

@@ -3,6 +3,7 @@
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Key, Table};
+use tickbus_fieldbus::examine::{Complaint, Examination};
 use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, CYCLE, NamedFile, OpenError, Role};
 use tickbus_image::signal::SignalTable;
 
@@ -68,5 +69,13 @@ impl BusOptions for Options {
 
     fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
         self.fit(table, collector);
+    }
+
+    fn examine(&self, examination: &mut Examination<'_>) {
+        self.examine(examination);
+    }
+
+    fn complaints(&self) -> Option<&'static [Complaint]> {
+        (self.tcp == TcpRole::Listen).then_some(&[])
     }
 }

@@ -11,6 +11,7 @@ mod connect;
 mod connection;
 mod connection_states;
 mod end_reason;
+mod examine;
 mod frames;
 mod kind;
 mod listen;

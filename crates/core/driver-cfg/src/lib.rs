@@ -16,6 +16,7 @@ mod overlay;
 mod page;
 mod real_time;
 mod restart;
+mod setup;
 mod timing;
 
 /// The kinds that this crate's tests use.

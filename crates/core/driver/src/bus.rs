@@ -6,7 +6,7 @@ use std::sync::Arc;
 use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_driver_cfg::loopback::{Mode, Options, Peer};
 use tickbus_fieldbus::loopback::{self, FreeLoopback, private_link};
-use tickbus_fieldbus::{Bus, BusSetup, Hosted, OpenError, Role, SwallowedSignals};
+use tickbus_fieldbus::{Bus, Hosted, OpenError, Role, SwallowedSignals};
 use tickbus_image::signal::Area;
 use tickbus_plc as plc;
 
@@ -43,18 +43,7 @@ pub(super) fn open(
             } => return open_hosted(config, options.mode, (name, given, *scan), clock, swallowed),
         }
     }
-    let setup = BusSetup {
-        name: &config.name,
-        id: config.id,
-        folder: config.folder(),
-        role: config.role,
-        table: &config.table,
-        cycle: config.timing.cycle,
-        max_age: config.timing.max_age,
-        events: config.events,
-        clock,
-        hosted,
-    };
+    let setup = config.bus_setup(clock, hosted);
     let bus = config.bus.open(&setup).map_err(|error| {
         let file = config.path.display().to_string();
         match error {

@@ -11,7 +11,7 @@
 //! | [`Acceptor`] | accepting clients in a poll set |
 //! | [`prepare`], [`close_gracefully`], … | what every connection needs from the system |
 //! | [`begins_like_browser`] | distinguishing a web browser from a peer |
-//! | [`serial`] | serial ports |
+//! | [`serial`], [`serial_users`] | serial ports; who may use them, and who does |
 //! | [`Message`], [`Inbox`] | the messages of helper processes, over any stream |
 //!
 //! The sockets themselves, of the system or of a simulation, are those of [`tickbus_base::net`].
@@ -28,6 +28,7 @@ mod message;
 mod reachable;
 mod resolve;
 pub mod serial;
+pub mod serial_users;
 mod stream;
 mod udp;
 

@@ -114,6 +114,16 @@ pub struct Swept {
     pub failed: usize,
 }
 
+impl Swept {
+    /// Adds the counts of another sweep.
+    pub fn add(&mut self, other: Self) {
+        self.attempts += other.attempts;
+        self.refused += other.refused;
+        self.silent += other.silent;
+        self.failed += other.failed;
+    }
+}
+
 /// How often a sweep looks for room while there is none.
 const AGAIN: Nanos = Nanos::from_millis(10);
 

@@ -6,6 +6,7 @@ use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Key, Table};
 use tickbus_dispatcher::Kind;
+use tickbus_fieldbus::examine::Examination;
 use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, CYCLE, NamedFile, OpenError, Role};
 use tickbus_image::signal::{Signal, SignalTable};
 
@@ -78,5 +79,9 @@ impl BusOptions for Options {
         let mut channels = table.signals.iter().zip(self.channels(table).list);
         let own = channels.find(|(other, _)| other.name == signal.name);
         own.map_or_else(String::new, |(_, channel)| channel.to_string())
+    }
+
+    fn examine(&self, examination: &mut Examination<'_>) {
+        self.examine(examination);
     }
 }

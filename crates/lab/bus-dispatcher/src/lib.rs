@@ -8,6 +8,7 @@
 
 mod bus;
 mod channels;
+mod examine;
 mod inputs;
 mod kind;
 mod options;

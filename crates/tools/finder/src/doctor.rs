@@ -5,9 +5,8 @@ use std::sync::Arc;
 use crate::finding::{Device, speaks};
 use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_base::toml_text::printable;
-use tickbus_driver::Driver;
+use tickbus_driver::{Code, Driver};
 use tickbus_driver_cfg::Config;
-use tickbus_fieldbus::BusSetup;
 use tickbus_fieldbus::examine::{Complaint, Examination, Step, Verdict};
 
 /// The times of an examination.
@@ -32,18 +31,7 @@ pub fn examine(config: &Config, terms: Terms, clock: &Arc<dyn Clock>, stop: &Sto
         let signal = config.table.position(&watch.name)?;
         Some((signal, watch.within))
     });
-    let setup = BusSetup {
-        name: &config.name,
-        id: config.id,
-        folder: config.folder(),
-        role: config.role,
-        table: &config.table,
-        cycle: config.timing.cycle,
-        max_age: config.timing.max_age,
-        events: config.events,
-        clock,
-        hosted: None,
-    };
+    let setup = config.bus_setup(clock, None);
     let mut examination = Examination::new(setup, watched.collect(), terms.watch, stop);
     examination.ok(
         "file",
@@ -130,10 +118,17 @@ fn serve(
     let end = clock.now() + wait;
     let mut was_there = false;
     while clock.now() < end && !stop.is_stopped() {
-        driver.exchange(None, &mut slots);
+        let exchange = driver.exchange(None, &mut slots);
+        was_there |= matches!(exchange.code, Code::Fresh | Code::Unchanged);
         was_there |= driver.fact("clients").is_some_and(|clients| clients != "0");
         clock.wait_until(end.min(clock.now() + TICK), stop);
     }
+    let waited = if stop.is_stopped() {
+        wait - (end - clock.now()).max(Nanos::ZERO)
+    } else {
+        wait
+    };
+    let waited = Nanos(waited.0 - waited.0 % 1_000_000);
     let count = |counter: &str| {
         let statistics = driver.statistics();
         let mut values = statistics.lines().filter_map(|line| line.split_once('='));
@@ -154,12 +149,12 @@ fn serve(
         examination.fail(
             "client",
             "nobody-connects",
-            format!("nobody has connected within {wait}"),
+            format!("nobody has connected within {waited}"),
             "check the address and port in the PLC, whether it is in RUN, and the firewall of this computer",
         );
         return;
     }
-    examination.ok("client", format!("somebody has connected within {wait}"));
+    examination.ok("client", format!("somebody has connected within {waited}"));
     // Without counters nobody knows.
     if complaints.is_empty() && !all.is_empty() {
         examination.ok("requests", "all requests were answered");

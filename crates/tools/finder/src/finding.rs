@@ -12,12 +12,15 @@ use tickbus_base::toml_text::printable;
 use tickbus_fieldbus::examine::{Found, Peer, Search, Searching};
 use tickbus_net::{Limits, Swept, sweep};
 
+use crate::Plan;
+use crate::datagrams;
+
 /// The time in which a port must accept a connection. Below one second this is a single packet, as systems repeat it
 /// after one second (RFC 6298, 2.1).
-const CONNECT: Nanos = Nanos::from_millis(900);
+pub(crate) const CONNECT: Nanos = Nanos::from_millis(900);
 
 /// The time in which a device must answer a question.
-const ANSWER: Nanos = Nanos::from_millis(500);
+pub(crate) const ANSWER: Nanos = Nanos::from_millis(500);
 
 /// How many devices are asked at the same time.
 const ASKED: usize = 64;
@@ -27,19 +30,6 @@ const FILES: usize = 8;
 
 /// The most connections that wait to be asked: some firewalls accept connections to every address.
 const WAITING: usize = 256;
-
-/// A search.
-#[derive(Clone, Debug)]
-pub struct Plan {
-    /// The buses, each with the port at which its servers are searched.
-    pub searches: Vec<(Search, u16)>,
-    /// The addresses with their ports.
-    pub addresses: Vec<SocketAddr>,
-    /// Connections per second.
-    pub rate: u32,
-    /// The Modbus units to ask; empty for the usual ones.
-    pub units: Vec<u8>,
-}
 
 /// One device that answered.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -69,6 +59,30 @@ pub struct Findings {
 ///
 /// The system cannot wait for sockets, or has no more files or threads.
 pub fn find(plan: &Plan, clock: &Arc<dyn Clock>, stop: &Stop) -> io::Result<Findings> {
+    let mut findings = sweep_all(plan, clock, stop)?;
+    if plan.udp {
+        findings.devices.extend(datagrams::find(plan, clock, stop)?);
+    }
+    // Only those whom the user's own addresses name are believed: a chain of them has no end.
+    if let Some(further) = plan.further(&findings.devices, &**clock, stop) {
+        let Findings {
+            devices,
+            unknown,
+            swept,
+        } = sweep_all(&further, clock, stop)?;
+        findings.devices.extend(devices);
+        findings.unknown.extend(unknown);
+        findings.swept.add(swept);
+    }
+    findings.devices.sort_by(|a: &Device, b| {
+        (a.address, a.bus, &a.found.facts).cmp(&(b.address, b.bus, &b.found.facts))
+    });
+    findings.unknown.sort_unstable();
+    Ok(findings)
+}
+
+/// Connects to each address of the plan once, and asks those that accept.
+fn sweep_all(plan: &Plan, clock: &Arc<dyn Clock>, stop: &Stop) -> io::Result<Findings> {
     let limits = Limits {
         rate: plan.rate,
         patience: CONNECT,
@@ -134,15 +148,9 @@ pub fn find(plan: &Plan, clock: &Arc<dyn Clock>, stop: &Stop) -> io::Result<Find
             },
         )
     })?;
-    let mut devices = devices.into_inner().unwrap_or_else(PoisonError::into_inner);
-    devices.sort_by(|a: &Device, b| {
-        (a.address, a.bus, &a.found.facts).cmp(&(b.address, b.bus, &b.found.facts))
-    });
-    let mut unknown = unknown.into_inner().unwrap_or_else(PoisonError::into_inner);
-    unknown.sort_unstable();
     Ok(Findings {
-        devices,
-        unknown,
+        devices: devices.into_inner().unwrap_or_else(PoisonError::into_inner),
+        unknown: unknown.into_inner().unwrap_or_else(PoisonError::into_inner),
         swept,
     })
 }
@@ -214,11 +222,12 @@ pub(crate) fn speaks(
 }
 
 /// Texts of a device as text: a terminal or a file must not take them for commands.
-fn legible(found: Found) -> Found {
+pub(crate) fn legible(found: Found) -> Found {
     let Found {
         identity,
         facts,
         stanza,
+        named,
     } = found;
     let facts = facts
         .into_iter()
@@ -227,6 +236,7 @@ fn legible(found: Found) -> Found {
         identity: printable(&identity),
         facts: facts.collect(),
         stanza: stanza.lines().map(|line| printable(line) + "\n").collect(),
+        named: named.iter().map(|url| printable(url)).collect(),
     }
 }
 
@@ -260,12 +270,14 @@ mod tests {
             bus: "none",
             port,
             ask: in_vain,
+            datagrams: None,
         };
         let plan = Plan {
             searches: vec![(search, port)],
             addresses: addresses.collect(),
             rate: 2000,
             units: Vec::new(),
+            udp: false,
         };
         thread::spawn(move || {
             let mut held = Vec::new();

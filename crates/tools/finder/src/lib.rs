@@ -9,10 +9,13 @@
 //! A bus knows its own questions: [`Search`](tickbus_fieldbus::examine::Search) and
 //! [`BusOptions::examine`](tickbus_fieldbus::BusOptions::examine). Nothing is written to anybody.
 
+mod datagrams;
 mod doctor;
 mod finding;
+mod plan;
 mod target;
 
 pub use doctor::{Terms, cause, examine};
-pub use finding::{Device, Findings, Plan, find};
-pub use target::{Target, addresses};
+pub use finding::{Device, Findings, find};
+pub use plan::{Plan, RATE};
+pub use target::Target;

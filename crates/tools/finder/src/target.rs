@@ -109,7 +109,7 @@ impl Target {
 /// # Errors
 ///
 /// A name is unknown.
-pub fn addresses(
+pub(crate) fn addresses(
     targets: &[Target],
     ports: &[u16],
     clock: &dyn Clock,

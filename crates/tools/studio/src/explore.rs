@@ -7,16 +7,13 @@ use tickbus_base::time::{Clock, Monotonic, Nanos, Stop};
 use tickbus_base::toml_text::shown;
 use tickbus_driver_cfg::{Config, Kinds};
 use tickbus_fieldbus::examine::Step;
-use tickbus_finder::{Device, Plan, Target, Terms, addresses, cause, examine, find};
+use tickbus_finder::{Device, Plan, Target, Terms, cause, examine, find};
 
 /// How long values are watched.
 const WATCH: Nanos = Nanos::from_secs(1);
 
 /// How long a server waits for its PLC, to see what it asks for in vain.
 const WAIT: Nanos = Nanos::from_secs(5);
-
-/// Connections per second of a search, as `tickbus find` has.
-const RATE: u32 = 500;
 
 /// The last examination and the last search.
 #[derive(Debug, Default)]
@@ -121,14 +118,7 @@ pub(crate) fn search(
     let clock: Arc<dyn Clock> = Monotonic::shared();
     let searches = kinds.searches().into_iter();
     let searches: Vec<_> = searches.map(|search| (search, search.port)).collect();
-    let ports: Vec<u16> = searches.iter().map(|(_, port)| *port).collect();
-    let addresses = addresses(targets, &ports, &*clock, stop).map_err(|error| error.to_string())?;
-    let plan = Plan {
-        searches,
-        addresses,
-        rate: RATE,
-        units: Vec::new(),
-    };
+    let plan = Plan::of(targets, searches, &*clock, stop).map_err(|error| error.to_string())?;
     let findings = find(&plan, &clock, stop).map_err(|error| error.to_string())?;
     let mut told = match findings.devices.len() {
         0 => "nobody there speaks Modbus TCP, S7 or OPC UA at the usual ports; another port is written behind a colon".to_owned(),

@@ -1,16 +1,19 @@
 //! The steps of an examination that are Modbus' own: TLS, protocol, units, identity, and each signal's elements.
 
+mod addresses;
 mod ask;
+mod datagrams;
+mod serial;
 mod speak;
 
-use tickbus_base::time::Nanos;
-use tickbus_fieldbus::examine::{Examination, Neighbours, Peer, Round, Wire};
+use tickbus_base::time::{Clock, Nanos};
+use tickbus_fieldbus::examine::{Examination, Round, Wire};
 use tickbus_image::signal::{Signal, SignalTable};
 use tickbus_net::Address;
 
 use super::{ClientOptions, Region, Request};
 use crate::tls::{self, ClientSide};
-use crate::{ElementAddress, Exception, Line, Piece, Span, Table};
+use crate::{Line, Piece, Span, Table};
 
 pub(super) use ask::{Frame, Miss, Talk, legible};
 use speak::{Reached, answers};
@@ -18,17 +21,14 @@ use speak::{Reached, answers};
 /// The units that devices usually have, to be tried if the one of the file does not answer.
 pub(super) const USUAL_UNITS: [u8; 5] = [1, 255, 0, 2, 3];
 
-/// The most requests for single signals: a table of thousands is not read element by element.
-const SINGLES: usize = 200;
-
 impl ClientOptions {
     /// Examines the line.
     pub(crate) fn examine(&self, examination: &mut Examination<'_>) {
         let (address, frame) = match &self.line {
             Line::Tcp(address) => (address, Frame::Tcp),
             Line::RtuOverTcp(address) => (address, Frame::Rtu),
-            Line::Udp(_) => return examination.unexamined("Modbus over UDP"),
-            Line::Serial(_) => return examination.unexamined("a serial line"),
+            Line::Udp(address) => return self.examine_datagrams(examination, address),
+            Line::Serial(serial) => return self.examine_serial(examination, serial),
         };
         let Some((peer, wire)) = examination.reach(address) else {
             return;
@@ -47,17 +47,34 @@ impl ClientOptions {
                 return;
             }
         }
+        let device = peer.address.to_string();
+        let served = |examination: &mut Examination<'_>| {
+            second_client(examination, &reached, self.unit(0));
+        };
+        self.look_at_values(examination, talk, (&device, &|| reached.again()), served);
+    }
+
+    /// The steps from `identity` on, with a device that speaks Modbus. `again` is another connection with it, if it has
+    /// more than one; `before_values` is a step before the values are watched.
+    fn look_at_values(
+        &self,
+        examination: &mut Examination<'_>,
+        mut talk: Talk,
+        (device, again): (&str, &dyn Fn() -> Option<Talk>),
+        before_values: impl FnOnce(&mut Examination<'_>),
+    ) {
         for station in 0..examination.setup.table.stations.len() {
-            self.identify(examination, &reached, &mut talk, station);
+            self.identify(examination, device, &mut talk, station, again);
         }
         let requests = self.reads(examination);
         examination.sizes(&format!("{} requests read all of it", requests.len()));
         if !self.read_each(examination, &mut talk) {
             return;
         }
-        second_client(examination, &reached, self.unit(0));
+        before_values(examination);
         let pieces = self.pieces_of_signals(examination);
-        examination.watch_values(|| round(&mut talk, &peer, &requests, &pieces));
+        let clock = examination.setup.clock;
+        examination.watch_values(|| round(&mut talk, &**clock, &requests, &pieces));
     }
 
     /// Begins TLS, if the file asks for it; `None` if that has failed.
@@ -155,9 +172,10 @@ impl ClientOptions {
     fn identify(
         &self,
         examination: &mut Examination<'_>,
-        reached: &Reached<'_>,
+        device: &str,
         talk: &mut Talk,
         station: usize,
+        again: &dyn Fn() -> Option<Talk>,
     ) {
         let unit = self.unit(station);
         let write_to = self.stations.write_to(station);
@@ -165,7 +183,7 @@ impl ClientOptions {
         if matches!(identity, Err(Miss::End(_) | Miss::Alien(_))) {
             // Some devices close the connection, or are out of step, after this question.
             talk.hang_up();
-            if let Some(again) = reached.again() {
+            if let Some(again) = again() {
                 *talk = again;
             }
         }
@@ -175,154 +193,12 @@ impl ClientOptions {
             .map(crate::Identification::line)
             .unwrap_or_default();
         if line.is_empty() {
-            let usual = format!("modbus device at {}, unit {unit}", reached.peer.address);
+            let usual = format!("modbus device at {device}, unit {unit}");
             examination.compare_identity(&usual, write_to);
         } else {
             examination.compare_identity(&line, write_to);
         }
     }
-
-    /// The steps `addresses` and `values`. False if the device refuses everything.
-    fn read_each(&self, examination: &mut Examination<'_>, talk: &mut Talk) -> bool {
-        let mut refused: Vec<(usize, Miss, [bool; 2])> = Vec::new();
-        let mut values = Vec::new();
-        let count = examination.setup.table.signals.len();
-        for index in 0..count.min(SINGLES) {
-            let signal = &examination.setup.table.signals[index];
-            let unit = self.unit(signal.station);
-            let pieces = self.pieces_of(examination, signal);
-            let bytes = signal.data_type.size_bytes();
-            let mut read = |shift: isize| read_shifted(talk, unit, &pieces, shift, bytes);
-            match read(0) {
-                Some(Ok(here)) if bytes > 1 => {
-                    let at = |shift: isize| place(&pieces, shift);
-                    values.push(Neighbours {
-                        signal: index,
-                        here,
-                        below: read(-1).and_then(Result::ok),
-                        above: read(1).and_then(Result::ok),
-                        places: [at(0), at(-1), at(1)],
-                    });
-                }
-                Some(Ok(_)) | None => {}
-                Some(Err(miss @ (Miss::End(_) | Miss::Alien(_)))) => {
-                    let name = &signal.name;
-                    let next = "see whether the device closes connections at this request: read less, or from \
-                                another table";
-                    let why = format!(
-                        "the device {miss} when \"{name}\" at {} is read",
-                        place(&pieces, 0)
-                    );
-                    examination.fail("addresses", "connection-lost", why, next);
-                    return false;
-                }
-                Some(Err(miss)) => {
-                    let can = [-1, 1].map(|shift| matches!(read(shift), Some(Ok(_))));
-                    refused.push((index, miss, can));
-                }
-            }
-        }
-        if refused.is_empty() {
-            let rest = if count > SINGLES {
-                format!("; the first {SINGLES} were read one by one")
-            } else {
-                String::new()
-            };
-            examination.ok("addresses", format!("all signals can be read{rest}"));
-        } else {
-            self.tell_refused(examination, &refused);
-        }
-        examination.judge_values(&values);
-        !refused.len().eq(&count.min(SINGLES)) || count == 0
-    }
-
-    fn tell_refused(
-        &self,
-        examination: &mut Examination<'_>,
-        refused: &[(usize, Miss, [bool; 2])],
-    ) {
-        let signals = &examination.setup.table.signals;
-        let details: Vec<String> = refused
-            .iter()
-            .take(10)
-            .map(|(index, miss, _)| {
-                let pieces = self.pieces_of(examination, &signals[*index]);
-                format!(
-                    "\"{}\" at {}: the device {miss}",
-                    signals[*index].name,
-                    place(&pieces, 0)
-                )
-            })
-            .collect();
-        let is = |exception| {
-            refused
-                .iter()
-                .all(|(_, miss, _)| *miss == Miss::Refused(exception))
-        };
-        let all = |side: usize| refused.iter().all(|(_, _, can)| can[side]);
-        let (cause, next) = if is(Exception::ILLEGAL_FUNCTION) {
-            (
-                "function-refused",
-                "the device does not have this table: place the signals in another one, such as \
-                 \"holding-register:0\", in [fieldbus.at], \"inputs\" or \"outputs\"",
-            )
-        } else if all(0) || all(1) {
-            (
-                "off-by-one",
-                if all(0) {
-                    "one element lower each can be read: many manuals count from 1, and the wire counts from 0"
-                } else {
-                    "one element higher each can be read: the device counts from 1"
-                },
-            )
-        } else {
-            (
-                "address-refused",
-                "the device has no such elements: correct the addresses, or enlarge the area in the PLC",
-            )
-        };
-        let evidence = format!(
-            "{} of {} signals cannot be read",
-            refused.len(),
-            signals.len()
-        );
-        examination.fail("addresses", cause, evidence, next).details = details;
-    }
-}
-
-/// Reads the pieces of a signal, moved by `shift` elements; `None` if they would leave the table.
-fn read_shifted(
-    talk: &mut Talk,
-    unit: u8,
-    pieces: &[Piece],
-    shift: isize,
-    bytes: usize,
-) -> Option<Result<Vec<u8>, Miss>> {
-    let mut receives = vec![0; bytes];
-    for piece in pieces {
-        let width = isize::try_from(piece.table.width()).ok()?;
-        let wire = piece.wire.checked_add_signed(shift * width)?;
-        let piece = Piece { wire, ..*piece };
-        if piece.span().end() > crate::table::ADDRESSES {
-            return None;
-        }
-        for request in super::queries(&[piece], &[], &super::Capabilities::new(false, 0)) {
-            if let Err(miss) = talk.read(unit, &request, &mut receives) {
-                return Some(Err(miss));
-            }
-        }
-    }
-    Some(Ok(receives))
-}
-
-/// The first element of a signal, moved by `shift` elements.
-fn place(pieces: &[Piece], shift: isize) -> String {
-    let first = pieces.first().and_then(|piece| {
-        let offset = piece.span().first.checked_add_signed(shift)?;
-        let table = piece.table;
-        Some(ElementAddress { table, offset }.to_string())
-    });
-    first.unwrap_or_default()
 }
 
 /// The step `clients`: whether the device serves a second client beside this one.
@@ -343,11 +219,11 @@ fn second_client(examination: &mut Examination<'_>, reached: &Reached<'_>, unit:
 /// Reads everything with as few requests as the driver makes.
 fn round(
     talk: &mut Talk,
-    peer: &Peer,
+    clock: &dyn Clock,
     requests: &[(u8, Request)],
     pieces: &[(u8, Vec<Piece>)],
 ) -> Option<Round> {
-    let begin = peer.now();
+    let begin = clock.now();
     let mut regions = Vec::new();
     for (unit, request) in requests {
         let Some(region) = request.read() else {
@@ -370,7 +246,7 @@ fn round(
             Err(_) => return None,
         }
     }
-    let took: Nanos = peer.now() - begin;
+    let took: Nanos = clock.now() - begin;
     let value = |(unit, pieces): &(u8, Vec<Piece>)| {
         let mut value = Vec::new();
         for piece in pieces {

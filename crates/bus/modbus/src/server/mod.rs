@@ -2,6 +2,7 @@
 
 mod at;
 mod diagnostics;
+mod examine;
 mod files;
 mod options;
 mod reserved;

@@ -14,6 +14,7 @@ pub(crate) const SEARCH: Search = Search {
     bus: "s7",
     port: PORT,
     ask,
+    datagrams: None,
 };
 
 /// Asks for the identity, at each of the usual racks and slots until one answers.
@@ -56,5 +57,6 @@ fn describe(peer: &Peer, (rack, slot): (u8, u8), identity: Option<&Identity>) ->
             "[fieldbus]\nkind    = \"s7-client\"\naddress = \"{}\"\nrack    = {rack}\nslot    = {slot}\n",
             peer.address
         ),
+        named: Vec::new(),
     }
 }

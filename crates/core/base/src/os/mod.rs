@@ -50,7 +50,7 @@ pub use pollable::{Pollable, Source};
 #[cfg(unix)]
 pub use process_watch::ProcessWatch;
 #[cfg(unix)]
-pub use pseudo_terminal::PseudoTerminal;
+pub use pseudo_terminal::{PseudoTerminal, names_pseudo_terminal};
 pub(crate) use real_time::{Os, RealTimeSystem};
 pub use serial::{Parity, SerialPort, SerialSettings};
 pub use serial_line::{SerialEar, SerialLine};

@@ -72,7 +72,7 @@ impl PseudoTerminal {
 }
 
 /// True if the path is a name that the system gives to pseudo-terminals.
-pub(super) fn names_pseudo_terminal(path: &Path) -> bool {
+pub fn names_pseudo_terminal(path: &Path) -> bool {
     if cfg!(target_os = "macos") {
         let name = path
             .to_str()

@@ -6,11 +6,12 @@
 mod orders;
 mod report;
 mod search;
+mod serial;
 mod values;
 mod wire;
 
 pub use orders::Neighbours;
 pub use report::{Examination, Step, Verdict};
-pub use search::{Complaint, Found, Search, Searching};
+pub use search::{Complaint, Datagrams, Found, Search, Searching};
 pub use values::Round;
 pub use wire::{Peer, Plain, Wire, WireEnd};

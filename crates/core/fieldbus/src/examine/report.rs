@@ -1,6 +1,6 @@
 //! The steps of an examination, and those that all buses have in common.
 
-use std::net::SocketAddr;
+use std::net::{SocketAddr, UdpSocket};
 
 use tickbus_base::time::{Nanos, Stop};
 use tickbus_image::signal::{Area, Signal};
@@ -197,8 +197,8 @@ impl<'a> Examination<'a> {
         }
     }
 
-    /// Looks up the host, and connects: the steps `name`, `route` and `port`. `None` if one has failed.
-    pub fn reach(&mut self, address: &Address) -> Option<(Peer, Wire)> {
+    /// Looks up the host: the step `name`. `None` if it has failed.
+    fn look_up(&mut self, address: &Address) -> Option<Vec<SocketAddr>> {
         let addresses = match look_up(address, &**self.setup.clock, self.stop) {
             Ok(addresses) => addresses,
             Err(error) => {
@@ -218,6 +218,32 @@ impl<'a> Examination<'a> {
                 Host::Name(name) => format!("{name} is {}", texts.join(", ")),
             },
         );
+        Some(addresses)
+    }
+
+    /// Looks up a peer to which there is no connection: the steps `name` and `route`. `None` if one has failed.
+    pub fn find_peer(&mut self, address: &Address) -> Option<Peer> {
+        let address = self.look_up(address)?.into_iter().next()?;
+        match route(address) {
+            Ok(own) => {
+                self.ok("route", format!("from {own}"));
+                Some(Peer::new(
+                    address,
+                    Self::CONNECT,
+                    self.patience,
+                    self.setup.clock,
+                ))
+            }
+            Err(why) => {
+                self.unreachable(address, why);
+                None
+            }
+        }
+    }
+
+    /// Looks up the host, and connects: the steps `name`, `route` and `port`. `None` if one has failed.
+    pub fn reach(&mut self, address: &Address) -> Option<(Peer, Wire)> {
+        let addresses = self.look_up(address)?;
         let mut last = None;
         for address in addresses {
             match self.connect(address) {
@@ -241,7 +267,8 @@ impl<'a> Examination<'a> {
         Ok((peer, wire))
     }
 
-    fn unreachable(&mut self, address: SocketAddr, why: Unreachable) {
+    /// Says why there is no connection with an address.
+    pub fn unreachable(&mut self, address: SocketAddr, why: Unreachable) {
         if let Unreachable::NoRoute(error) = why {
             let next = "check the network of this computer: its address and mask must fit those of the PLC, and the \
                         cable and the adapter must be up";
@@ -281,12 +308,27 @@ impl<'a> Examination<'a> {
 
     /// Checks that a server could listen on `address`: the steps `name` and `port`. False if it could not.
     pub fn can_listen(&mut self, address: &Address) -> bool {
+        self.can_have(address, |address| bind(address, None).map(drop))
+    }
+
+    /// Checks that a server could receive datagrams on `address`: the steps `name` and `port`. False if it could not.
+    pub fn can_receive(&mut self, address: &Address) -> bool {
+        self.can_have(address, |address| {
+            UdpSocket::bind(address.to_string()).map(drop)
+        })
+    }
+
+    fn can_have(
+        &mut self,
+        address: &Address,
+        bind: impl FnOnce(&Address) -> std::io::Result<()>,
+    ) -> bool {
         if let Err(error) = look_up(address, &**self.setup.clock, self.stop) {
             let next = "write an IP address of this computer, or 0.0.0.0 for all of its networks";
             self.fail("name", "name-unknown", error.to_string(), next);
             return false;
         }
-        let Err(error) = bind(address, None) else {
+        let Err(error) = bind(address) else {
             let is_local = matches!(&address.host, Host::Ip(ip) if ip.is_loopback());
             let step = self.ok("port", format!("{address} is free"));
             if is_local {

@@ -11,6 +11,17 @@ pub struct Search {
     pub port: u16,
     /// Asks a peer who it is. Returns nothing if the peer does not speak this bus. Writes nothing.
     pub ask: fn(Searching<'_>) -> Vec<Found>,
+    /// How servers that are reached by datagrams are found; `None` for a bus without them.
+    pub datagrams: Option<Datagrams>,
+}
+
+/// Questions that can be sent to an address of which nothing is known.
+#[derive(Clone, Copy, Debug)]
+pub struct Datagrams {
+    /// The units to ask one after another, until one answers.
+    pub units: &'static [u8],
+    /// The question to a unit, which any server of the bus answers. Writes nothing.
+    pub question: fn(u8) -> Vec<u8>,
 }
 
 /// A peer that has accepted a connection.
@@ -33,6 +44,9 @@ pub struct Found {
     pub facts: Vec<(&'static str, String)>,
     /// The `[fieldbus]` table of a driver.cfg for this device.
     pub stanza: String,
+    /// The addresses of other servers that the device names, as it writes them, such as `opc.tcp://press:4840`. They are
+    /// text of the peer.
+    pub named: Vec<String>,
 }
 
 /// A counter of a server that shows what its clients do wrong, with its meaning.

@@ -4,7 +4,8 @@ use std::fmt;
 
 use crate::identification::{READ_DEVICE_IDENTIFICATION, Taken};
 use crate::mbap::{self, Telegram};
-use crate::{Exception, Function, Identification, rtu};
+use crate::{Coding, Exception, Function, Identification, ascii, rtu};
+use tickbus_base::time::Nanos;
 use tickbus_fieldbus::examine::{Wire, WireEnd};
 
 use super::super::request::{AnswerError, Request, expect, length};
@@ -16,6 +17,12 @@ pub(in crate::client) enum Frame {
     Tcp,
     /// As RTU, with a checksum.
     Rtu,
+    /// As on a serial line, with the echo of each request if `echoes`. Requests are `apart` from what was before them.
+    Serial {
+        coding: Coding,
+        echoes: bool,
+        apart: Nanos,
+    },
 }
 
 /// Why there is no answer.
@@ -29,6 +36,11 @@ pub(in crate::client) enum Miss {
     Refused(Exception),
     /// The answer violates the standard.
     Malformed(String),
+    /// The line sends the request back, or does not although the file says so.
+    Echo {
+        /// True if the file says that the line echoes.
+        expected: bool,
+    },
 }
 
 impl fmt::Display for Miss {
@@ -44,6 +56,8 @@ impl fmt::Display for Miss {
             }
             Self::Refused(exception) => write!(f, "answers {exception}"),
             Self::Malformed(why) => f.write_str(why),
+            Self::Echo { expected: false } => f.write_str("sends each request back"),
+            Self::Echo { expected: true } => f.write_str("does not send requests back"),
         }
     }
 }
@@ -82,12 +96,39 @@ impl Talk {
         match self.frame {
             Frame::Tcp => mbap::append(self.transaction, unit, &mut request, copy),
             Frame::Rtu => rtu::append(unit, &mut request, copy),
+            Frame::Serial { coding, apart, .. } => {
+                self.wire.pause(apart);
+                let now = self.wire.now();
+                // Drops a late answer to an earlier question, here and below.
+                while self.wire.receive(&mut self.inbox, now).is_ok() {}
+                coding.append(unit, &mut request, copy);
+            }
         }
-        // Drops a late answer to an earlier question.
         self.inbox.clear();
         self.wire.send(&request).map_err(Miss::End)?;
         let deadline = self.wire.deadline();
+        let mut is_echoed = false;
         loop {
+            if let Frame::Serial { echoes, .. } = self.frame
+                && !is_echoed
+                && !self.inbox.is_empty()
+            {
+                if self.inbox.starts_with(&request) {
+                    if !echoes {
+                        return Err(Miss::Echo { expected: false });
+                    }
+                    self.inbox.drain(..request.len());
+                    is_echoed = true;
+                } else if request.starts_with(&self.inbox) {
+                    // An echo or an answer: the next bytes tell.
+                    self.wire
+                        .receive(&mut self.inbox, deadline)
+                        .map_err(Miss::End)?;
+                    continue;
+                } else if echoes {
+                    return Err(Miss::Echo { expected: true });
+                }
+            }
             if let Some(answer) = self.take(unit, pdu[0])? {
                 return Ok(answer);
             }
@@ -109,7 +150,18 @@ impl Talk {
                         (taken, is_it.then(|| telegram.pdu.to_vec()))
                     }
                 },
-                Frame::Rtu => match rtu::split(&self.inbox, length) {
+                Frame::Serial {
+                    coding: Coding::Ascii,
+                    ..
+                } => match ascii_telegram(&self.inbox) {
+                    None => return Ok(None),
+                    Some((taken, None)) => return Err(Miss::Alien(self.inbox[..taken].to_vec())),
+                    Some((taken, Some((from, pdu)))) => {
+                        let is_it = from == unit && pdu[0] & 0x7F == code;
+                        (taken, is_it.then_some(pdu))
+                    }
+                },
+                Frame::Rtu | Frame::Serial { .. } => match rtu::split(&self.inbox, length) {
                     Err(_) => return Err(Miss::Alien(self.inbox.clone())),
                     Ok(None) => return Ok(None),
                     Ok(Some((from, pdu, taken))) => {
@@ -177,6 +229,20 @@ impl Talk {
         }
         Ok(identification)
     }
+}
+
+/// The number of characters up to the end of the first telegram, and its unit and PDU if it is whole; `None` if it has no
+/// end yet.
+fn ascii_telegram(characters: &[u8]) -> Option<(usize, Option<(u8, Vec<u8>)>)> {
+    let mut framer = ascii::Framer::new(ascii::SILENCE);
+    let mut rest = characters;
+    framer.arrived(Nanos::ZERO, &mut rest);
+    let taken = characters.len() - rest.len();
+    let telegram = framer.take(Nanos::ZERO, |bytes| {
+        let (unit, pdu) = ascii::parse(bytes?)?;
+        Some((unit, pdu.to_vec()))
+    })?;
+    Some((taken, telegram))
 }
 
 fn miss(error: AnswerError) -> Miss {

@@ -125,7 +125,7 @@ impl ClientOptions {
     }
 
     /// A request that reads one element which the file uses.
-    fn probe(&self, examination: &Examination<'_>, station: usize) -> Request {
+    pub(super) fn probe(&self, examination: &Examination<'_>, station: usize) -> Request {
         let mut signals = examination.signals(station);
         let region = signals.find_map(|(_, signal)| {
             let piece = self.pieces_of(examination, signal).first().copied()?;
@@ -140,7 +140,7 @@ impl ClientOptions {
 fn wrong_frame(examination: &mut Examination<'_>, own: Frame, told: String) -> bool {
     let next = match own {
         Frame::Tcp => "the device speaks RTU over TCP: write framing = \"rtu\"",
-        Frame::Rtu => "the device speaks Modbus TCP: remove framing = \"rtu\"",
+        _ => "the device speaks Modbus TCP: remove framing = \"rtu\"",
     };
     examination.fail("protocol", "wrong-framing", told, next);
     false
@@ -149,7 +149,7 @@ fn wrong_frame(examination: &mut Examination<'_>, own: Frame, told: String) -> b
 const fn other_frame(frame: Frame) -> Frame {
     match frame {
         Frame::Tcp => Frame::Rtu,
-        Frame::Rtu => Frame::Tcp,
+        _ => Frame::Tcp,
     }
 }
 

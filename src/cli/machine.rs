@@ -7,7 +7,10 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
+use serde_json::{Value, json};
+
 use super::host::{self, Job, span};
+use super::json::print_document;
 use super::{Outcome, print, test};
 use folder::Unpacked;
 use shelf::{BuiltIn, MACHINES};
@@ -64,7 +67,7 @@ enum Found {
 
 pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
     if arguments.name == LIST {
-        return list();
+        return list(arguments.host.format.is_json());
     }
     match prepare_and_run(arguments, kinds) {
         Ok(outcome) => outcome,
@@ -138,7 +141,14 @@ fn find(name: &str) -> Result<Found, (String, Outcome)> {
     Err((reason, Outcome::Usage))
 }
 
-fn list() -> Outcome {
+fn list(as_json: bool) -> Outcome {
+    if as_json {
+        let machines = MACHINES.iter();
+        let machines = machines
+            .map(|machine| json!({ "name": machine.name, "title": machine.title() }))
+            .collect::<Value>();
+        return print_document("machine", json!({ "machines": machines }));
+    }
     let mut text = String::new();
     let width = MACHINES.iter().map(|machine| machine.name.len()).max();
     let width = width.unwrap_or_default();

@@ -56,6 +56,20 @@ fn files(folder: &Path) -> BTreeMap<PathBuf, String> {
 }
 
 #[test]
+fn the_list_is_a_document_for_programs_as_well() {
+    let listed = out(&machine(&["list", "--json"]));
+    let document: serde_json::Value = serde_json::from_str(&listed).expect("a document");
+    let machines = document["machines"].as_array().expect("a list");
+    let names: Vec<&str> = machines
+        .iter()
+        .filter_map(|one| one["name"].as_str())
+        .collect();
+    assert_eq!(names, MACHINES);
+    assert!(machines.iter().all(|one| one["title"] != ""));
+    assert_eq!(document["ok"], true);
+}
+
+#[test]
 fn the_list_has_each_machine_with_its_title() {
     let listed = out(&machine(&["list"]));
     let names: Vec<&str> = listed

@@ -401,6 +401,21 @@ fn span(reader: &Reader<'_>) -> Option<Span> {
     Some(span)
 }
 
+/// The place of a sensor or an exit, which must be on a track of this length, if it has one.
+fn on_track(reader: &Reader<'_>, at: f64, length: Option<Option<f64>>) -> Option<f64> {
+    match length.flatten() {
+        Some(length) if !(0.0..=length).contains(&at) => {
+            let [at, length] = [at, length].map(short_number);
+            reader.wrong(
+                "at",
+                format!("{at} is beyond the track, which is {length} long"),
+                format!("write a place from 0 to {length}, or a longer track"),
+            )
+        }
+        _ => Some(at),
+    }
+}
+
 fn track(reader: &Reader<'_>) -> Option<Behaviour> {
     let (speed, enters) = (speed(reader), reader.levels("enters"));
     let [length, size, gap] = ["length", "size", "gap"].map(|key| reader.above_zero(key));
@@ -411,7 +426,7 @@ fn track(reader: &Reader<'_>) -> Option<Behaviour> {
         whole.into_iter().collect::<Option<()>>()?;
         Some(Sensor {
             signal: signal??,
-            at: at??,
+            at: on_track(sensor, at??, length)?,
             span: span?,
         })
     });
@@ -423,7 +438,7 @@ fn track(reader: &Reader<'_>) -> Option<Behaviour> {
             let signal = exit.number_made("signal");
             exit.require("at")?;
             Some(Exit {
-                at: at??,
+                at: on_track(exit, at??, length)?,
                 when: when?,
                 span: span?,
                 signal: signal?,

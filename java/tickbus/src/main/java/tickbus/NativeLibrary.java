@@ -20,12 +20,14 @@ import java.util.stream.Collectors;
  * Finds and loads the native library, once per class loader.
  *
  * <p>Searches, in this order: the file named by the system property {@code tickbus.library} (and then nowhere else); the
- * directory named by {@code tickbus.native.dir}; the folder of the jar; the jar itself.
+ * directory named by {@code tickbus.native.dir}; the directory named by the variable {@code TICKBUS_NATIVE_DIR}; the folder
+ * of the jar; the jar itself.
  */
 final class NativeLibrary {
     static final String LIBRARY = "tickbus.library";
     static final String DIRECTORY = "tickbus.native.dir";
     static final String COPY = "tickbus.copy";
+    static final String VARIABLE = "TICKBUS_NATIVE_DIR";
 
     private static final String PREFIX = "tickbus-";
     /** Much longer than the time from a file's creation until it is loaded. */
@@ -75,15 +77,14 @@ final class NativeLibrary {
             return;
         }
         tried.add("property " + LIBRARY + ": not set");
-        if (!fromDirectory() && !besideTheJar() && !insideTheJar()) {
+        if (!fromDirectory("property " + DIRECTORY, System.getProperty(DIRECTORY))
+            && !fromDirectory("variable " + VARIABLE, System.getenv(VARIABLE)) && !besideTheJar() && !insideTheJar()) {
             throw failure();
         }
     }
 
-    private boolean fromDirectory() {
-        String place = "property " + DIRECTORY;
-        String directory = System.getProperty(DIRECTORY);
-        if (directory == null) {
+    private boolean fromDirectory(String place, String directory) {
+        if (directory == null || directory.isEmpty()) {
             tried.add(place + ": not set");
             return false;
         }
@@ -234,8 +235,13 @@ final class NativeLibrary {
             what.append("\n  If the temporary folder ").append(System.getProperty("java.io.tmpdir")).append(" is full or read-only, or")
                 .append(" nothing may be run there (noexec), name another one by -Djava.io.tmpdir=FOLDER.");
         }
-        what.append("\n  Build it with `cargo build --release` in tickbus, then set -D").append(LIBRARY)
-            .append("=FILE, or put ").append(file).append(" beside the jar (the zip has it in its folder DeviceDriver).");
+        if (tried.stream().anyMatch(text -> text.contains("`GLIBC_"))) {
+            what.append("\n  This system's C library is too old for it: the library of a release needs glibc 2.28, one that you"
+                + " build needs that of the computer that built it.");
+        }
+        what.append("\n  Name the folder that has ").append(file).append(" by -D").append(DIRECTORY).append("=FOLDER or the variable ")
+            .append(VARIABLE).append(", or put the file beside the jar. The zip has it in its folder DeviceDriver, and in the sources"
+                + " `cargo build --release` makes it.");
         return new FieldbusException(Status.LIBRARY, what.toString());
     }
 

@@ -109,9 +109,10 @@ class NativeLibraryTest {
             "LIBRARY \\(-9\\): the native library " + FILE + " for " + PLATFORM + " cannot be loaded. Looked at, in this order:",
             "1\\. property tickbus\\.library: not set",
             "2\\. property tickbus\\.native\\.dir: .*empty.*" + FILE + ": no such file",
-            "3\\. beside the jar: .*" + FILE + ": no such file",
-            "4\\. inside the jar: /tickbus/native/" + PLATFORM + "/" + FILE + ": not there",
-            "Build it with `cargo build --release`.*");
+            "3\\. variable TICKBUS_NATIVE_DIR: not set",
+            "4\\. beside the jar: .*" + FILE + ": no such file",
+            "5\\. inside the jar: /tickbus/native/" + PLATFORM + "/" + FILE + ": not there",
+            "Name the folder that has " + FILE + " by -Dtickbus\\.native\\.dir=FOLDER or the variable TICKBUS_NATIVE_DIR.*");
     }
 
     @Test
@@ -138,7 +139,7 @@ class NativeLibraryTest {
         assertLines(outcome, "1\\. property tickbus\\.library: .*broken\\.so: .*(header|short|valid|format).*");
         ChildJvm.Outcome inside = load(jar(broken));
         assertEquals(1, inside.exit());
-        assertLines(inside, "4\\. inside the jar: .*: extracted to .*: .+");
+        assertLines(inside, "5\\. inside the jar: .*: extracted to .*: .+");
     }
 
     @Test

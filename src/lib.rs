@@ -45,10 +45,13 @@
 //! Directions are named from the PLC, as everywhere in the field: `%I` is a PLC input, which the
 //! simulation writes; `%Q` is a PLC output, which the simulation reads.
 
+#[cfg(feature = "doors")]
 mod c_api;
 pub mod cli;
 pub mod fieldbus;
+#[cfg(feature = "doors")]
 mod fmi_api;
+#[cfg(feature = "doors")]
 mod jni;
 mod page;
 

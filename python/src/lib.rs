@@ -20,6 +20,7 @@ use pyo3::prelude::*;
 /// The native half of tickbus; use the package `tickbus`.
 #[pymodule]
 mod _native {
+    use std::ffi::OsString;
     use std::path::PathBuf;
 
     use pyo3::prelude::*;
@@ -55,6 +56,12 @@ mod _native {
     #[pyfunction]
     fn forked() {
         crate::opened::forked();
+    }
+
+    /// Runs the tickbus command in this process, and returns its exit code. The first argument is the name of the program.
+    #[pyfunction]
+    fn command(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
+        py.detach(|| tickbus::cli::command(&tickbus_kinds::KINDS, arguments))
     }
 
     /// Makes an HTML page from a recording, and returns its path.

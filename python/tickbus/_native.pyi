@@ -10,6 +10,7 @@ __version__: str
 MAX_DRIVERS: int
 STATUS_TABLE: list[tuple[int, str, str, str]]
 
+def command(arguments: list[str]) -> int: ...
 def forked() -> None: ...
 def report(
     recording: str | PathLike[str], title: str, statistics: str, texts: list[tuple[str, str]]

@@ -3,14 +3,10 @@
 
 use std::ffi::c_int;
 
-/// The exit code of a Rust program that panics.
-const PANICKED: c_int = 101;
-
 /// Runs the command with the arguments of the process, and returns its exit code.
 #[allow(unsafe_code)]
 // SAFETY: no other function has this name.
 #[unsafe(no_mangle)]
 extern "C" fn tickbus_command() -> c_int {
-    // The hook has reported the panic.
-    std::panic::catch_unwind(|| c_int::from(super::run(&crate::KINDS).code())).unwrap_or(PANICKED)
+    super::command(&crate::KINDS, std::env::args_os()).into()
 }

@@ -24,6 +24,7 @@ mod fmu_helper;
 mod gsd;
 mod host;
 mod import;
+#[cfg(feature = "doors")]
 mod in_library;
 mod json;
 mod lab;
@@ -48,7 +49,10 @@ mod sync;
 mod test;
 mod version;
 
+use std::ffi::OsString;
+use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::OnceLock;
 
 use clap::{Parser, Subcommand};
 
@@ -152,13 +156,51 @@ fn print(title: &str, text: &str) -> Outcome {
 /// The longest time that the process waits at its end for the log to reach stderr.
 const LOG_FLUSH_LIMIT: Nanos = Nanos::from_secs(1);
 
-/// Runs the command with the arguments of the process. A driver.cfg can name these `kinds` of bus.
-pub fn main(kinds: &'static Kinds) -> ExitCode {
-    run(kinds).code().into()
+/// The name by which the command was called.
+static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
+
+/// The path of the command, for lines that users copy: the program of this process, or the script that runs the command in
+/// the process of its interpreter.
+fn own_program() -> PathBuf {
+    let called = PROGRAM.get().cloned();
+    let called = called.unwrap_or_else(|| PathBuf::from("tickbus"));
+    let whole = called.canonicalize().unwrap_or_else(|_| called.clone());
+    match std::env::current_exe() {
+        Ok(own) if own.file_stem() == whole.file_stem() => own,
+        _ => called,
+    }
 }
 
-fn run(kinds: &'static Kinds) -> Outcome {
-    let arguments = Arguments::parse();
+/// The exit code of a Rust program that panics.
+const PANICKED: u8 = 101;
+
+/// Runs the command with the arguments of the process. A driver.cfg can name these `kinds` of bus.
+pub fn main(kinds: &'static Kinds) -> ExitCode {
+    command(kinds, std::env::args_os()).into()
+}
+
+/// Runs the command within a process of any language, and returns its exit code. The first of the arguments is the name
+/// of the program.
+pub fn command(kinds: &'static Kinds, arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    if let Some(name) = arguments.first() {
+        // A second command in one process is called by the same name.
+        let _ = PROGRAM.set(PathBuf::from(name));
+    }
+    // The hook has reported the panic.
+    std::panic::catch_unwind(|| run(kinds, arguments)).unwrap_or(PANICKED)
+}
+
+fn run(kinds: &'static Kinds, arguments: Vec<OsString>) -> u8 {
+    let arguments = match Arguments::try_parse_from(arguments) {
+        Ok(arguments) => arguments,
+        // Help and version, too.
+        Err(other) => {
+            // A reader that is gone needs no text.
+            let _ = other.print();
+            return u8::try_from(other.exit_code()).unwrap_or(Outcome::Usage.code());
+        }
+    };
     // Events on the line are reported on stdout.
     tickbus_base::os::log_to_stderr(log::LevelFilter::Error);
     let outcome = match arguments.command {
@@ -193,5 +235,5 @@ fn run(kinds: &'static Kinds) -> Outcome {
         Command::FmuHelper => fmu_helper::run(),
     };
     tickbus_base::os::flush_log(LOG_FLUSH_LIMIT);
-    outcome
+    outcome.code()
 }

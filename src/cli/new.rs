@@ -279,9 +279,7 @@ fn listen(usual: &Address) -> Result<Address, Failure> {
 
 /// How this command is called; the jar for Java; the folders of the header and of the library for C.
 fn places() -> (String, Option<String>, Option<(String, String)>) {
-    let Ok(own) = std::env::current_exe() else {
-        return ("tickbus".to_owned(), None, None);
-    };
+    let own = super::own_program();
     let folder = own.parent().unwrap_or(Path::new("")).to_owned();
     let version = env!("CARGO_PKG_VERSION");
     // Of a build, and of a zip.

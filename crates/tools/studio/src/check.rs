@@ -7,6 +7,7 @@ use tickbus_base::toml_text::Mistakes;
 use tickbus_driver_cfg::{Config, Kinds};
 use toml_edit::Document;
 
+use crate::document::body;
 use crate::places::{Places, Way};
 
 /// A mistake, and its cell.
@@ -55,7 +56,7 @@ pub(crate) fn check(path: &Path, text: &str, is_on_disk: bool, kinds: &'static K
 }
 
 fn placed(text: &str, mistakes: &Mistakes) -> Vec<Told> {
-    let body = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let body = body(text);
     let document = Document::parse(body).ok();
     let places = document.as_ref().map(Places::of).unwrap_or_default();
     let starts: Vec<usize> = std::iter::once(0)

@@ -9,6 +9,7 @@ use tickbus_base::toml_text::{Key, Shape};
 use tickbus_driver_cfg::{Kinds, keys};
 
 use crate::check::{Checked, check};
+use crate::document::body;
 use crate::edit::{Edit, Shapes, Unmade, adopt, make};
 use crate::file::{OnDisk, Unwritten};
 use crate::history::History;
@@ -316,7 +317,7 @@ impl Shapes for Desk {
 
 /// Says which signals of a text the table does not show.
 fn hidden(text: &str) -> Option<String> {
-    let body = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let body = body(text);
     // Most files need not be read for this.
     let mut lines = body.lines().map(str::trim_start);
     lines.find(|line| line.starts_with("signal"))?;

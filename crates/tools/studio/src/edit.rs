@@ -2,8 +2,9 @@
 
 use serde::Deserialize;
 use tickbus_base::toml_text::{Key, Shape, shown};
-use toml_edit::{ArrayOfTables, Document, DocumentMut, Item, Table, TableLike, Value};
+use toml_edit::{ArrayOfTables, DocumentMut, Item, Table, TableLike, Value};
 
+use crate::document::{parsed, written};
 use crate::layout;
 use crate::literal::{cell, literal, shape_of};
 use crate::places::{Step, Way};
@@ -73,17 +74,7 @@ pub(crate) fn make(
             "edited the text".to_owned(),
         ));
     }
-    let (bom, body) = match text.strip_prefix('\u{feff}') {
-        Some(body) => ("\u{feff}", body),
-        None => ("", text),
-    };
-    let parsed = Document::parse(body).map_err(|error| {
-        let what = error.message();
-        Unmade::Impossible(format!(
-            "the file is no TOML at the moment ({what}); mend that in its text first"
-        ))
-    })?;
-    let mut document = parsed.into_mut();
+    let mut document = parsed(text).map_err(Unmade::Impossible)?;
     let told = match edit {
         Edit::Set { at, was, to, of } => {
             if let (Some(of), [Step::Key(list), Step::Index(index), ..]) = (of, &at[..]) {
@@ -117,22 +108,14 @@ pub(crate) fn make(
         }
         Edit::Text { .. } => String::new(),
     };
-    let made = layout::ends_as(text, document.to_string());
-    Ok((format!("{bom}{made}"), told))
+    Ok((written(text, &document), told))
 }
 
 /// Puts the keys of a `[fieldbus]` table, which is a text of TOML, into that of a file. Returns the new text, and what was
 /// done.
 pub(crate) fn adopt(text: &str, table: &str) -> Result<(String, String), Unmade> {
-    let body = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let broken = |error: toml_edit::TomlError| {
-        let what = error.message();
-        Unmade::Impossible(format!(
-            "the file is no TOML at the moment ({what}); mend that in its text first"
-        ))
-    };
-    let found = Document::parse(table).map_err(broken)?;
-    let mut document = Document::parse(body).map_err(broken)?.into_mut();
+    let found = parsed(table).map_err(Unmade::Impossible)?;
+    let mut document = parsed(text).map_err(Unmade::Impossible)?;
     let own = table_at(&mut document, &[Step::Key("fieldbus".to_owned())])?;
     let keys = found.get("fieldbus").and_then(Item::as_table_like);
     for (name, item) in keys.into_iter().flat_map(TableLike::iter) {
@@ -148,9 +131,7 @@ pub(crate) fn adopt(text: &str, table: &str) -> Result<(String, String), Unmade>
             layout::insert(own, name, value);
         }
     }
-    let bom = &text[..text.len() - body.len()];
-    let made = layout::ends_as(text, document.to_string());
-    Ok((format!("{bom}{made}"), "took over a device".to_owned()))
+    Ok((written(text, &document), "took over a device".to_owned()))
 }
 
 fn quoted(text: &str) -> String {

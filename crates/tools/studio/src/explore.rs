@@ -15,11 +15,39 @@ const WATCH: Nanos = Nanos::from_secs(1);
 /// How long a server waits for its PLC, to see what it asks for in vain.
 const WAIT: Nanos = Nanos::from_secs(5);
 
+/// A question that takes longer than a request may.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Question {
+    /// Why the line of the file is not up.
+    Line,
+    /// Which devices are at these addresses.
+    Network(Vec<Target>),
+}
+
+impl Question {
+    /// The question that a page asks by this path, with this body; `None` for another path.
+    pub(crate) fn asked(path: &str, body: &str) -> Option<Result<Self, String>> {
+        match path {
+            "/studio/examine" => Some(Ok(Self::Line)),
+            "/studio/find" => Some(targets(body).map(Self::Network)),
+            _ => None,
+        }
+    }
+
+    /// The question as the page knows it.
+    const fn name(&self) -> &'static str {
+        match self {
+            Self::Line => "examine",
+            Self::Network(_) => "find",
+        }
+    }
+}
+
 /// The last examination and the last search.
 #[derive(Debug, Default)]
 pub(crate) struct Explored {
     /// The question that is under way, and its stop.
-    pub(crate) busy: Option<(&'static str, Stop)>,
+    busy: Option<(Question, Stop)>,
     steps: Vec<Step>,
     devices: Vec<Device>,
     /// The result of the search, in one line.
@@ -48,7 +76,7 @@ impl Explored {
             })
         });
         json!({
-            "busy": self.busy.as_ref().map(|(what, _)| *what),
+            "busy": self.busy.as_ref().map(|(question, _)| question.name()),
             "steps": steps.collect::<Json>(),
             "cause": cause(&self.steps),
             "devices": devices.collect::<Json>(),
@@ -62,15 +90,43 @@ impl Explored {
         Some(device.found.stanza.as_str()).filter(|table| !table.is_empty())
     }
 
+    /// Notes that this question is under way, until [`end`](Self::end).
+    ///
+    /// # Errors
+    ///
+    /// Another one is under way.
+    pub(crate) fn begin(&mut self, question: Question, stop: Stop) -> Result<(), String> {
+        if self.busy.is_some() {
+            return Err("something is looked for already; wait, or stop it".to_owned());
+        }
+        self.busy = Some((question, stop));
+        Ok(())
+    }
+
+    /// Notes that no question is under way any more.
+    pub(crate) fn end(&mut self) {
+        self.busy = None;
+    }
+
+    /// Ends the question that is under way early.
+    pub(crate) fn cancel(&self) {
+        if let Some((_, stop)) = &self.busy {
+            stop.stop();
+        }
+    }
+
+    /// True while the line is examined, which needs the line for itself.
+    pub(crate) fn is_examining(&self) -> bool {
+        matches!(self.busy, Some((Question::Line, _)))
+    }
+
     /// Takes over the steps of an examination.
     pub(crate) fn examined(&mut self, steps: Vec<Step>) {
         self.steps = steps;
-        self.busy = None;
     }
 
     /// Takes over what was found.
     pub(crate) fn found(&mut self, found: Result<(Vec<Device>, String), String>) {
-        self.busy = None;
         match found {
             Ok((devices, told)) => (self.devices, self.told) = (devices, told),
             Err(why) => (self.devices, self.told) = (Vec::new(), why),
@@ -94,7 +150,7 @@ pub(crate) fn look_along(config: &Config, stop: &Stop) -> Vec<Step> {
 /// # Errors
 ///
 /// One of them is none, or there is none at all.
-pub(crate) fn targets(text: &str) -> Result<Vec<Target>, String> {
+fn targets(text: &str) -> Result<Vec<Target>, String> {
     let words = text.split([' ', ',', ';']).filter(|word| !word.is_empty());
     let targets: Vec<Target> = words
         .map(|word| {

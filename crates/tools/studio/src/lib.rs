@@ -8,6 +8,7 @@ mod assets;
 mod beside;
 mod check;
 mod desk;
+mod document;
 mod edit;
 mod explore;
 mod file;

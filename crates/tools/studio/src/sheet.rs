@@ -6,6 +6,7 @@ use serde::Serialize;
 use serde_json::{Map, Value as Json, json};
 use toml_edit::{Document, DocumentMut, Item, TableLike};
 
+use crate::document::body;
 use crate::literal::cell;
 use crate::propose::next;
 
@@ -37,8 +38,7 @@ impl Sheet {
     ///
     /// The text is no TOML.
     pub(crate) fn of(text: &str) -> Result<Self, String> {
-        let body = text.strip_prefix('\u{feff}').unwrap_or(text);
-        let document = Document::parse(body).map_err(|error| error.message().to_owned())?;
+        let document = Document::parse(body(text)).map_err(|error| error.message().to_owned())?;
         Ok(Self::read(&document.into_mut()))
     }
 

@@ -8,14 +8,13 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use serde_json::json;
 use tickbus_base::time::{Monotonic, Stop};
 use tickbus_driver_cfg::{Config, Kinds};
-use tickbus_finder::Target;
 use tickbus_live_page::LivePage;
 use tickbus_web::{Answer, Asset, Change, Document, Outcome, Refused, Site, State, Verb};
 
 use crate::assets::assets;
 use crate::desk::{Desk, Refusal};
 use crate::edit::Edit;
-use crate::explore::{Explored, look_along, search, targets};
+use crate::explore::{Explored, Question, look_along, search};
 use crate::file::keep;
 use crate::line::{Line, Machine};
 use crate::running::{Asked, Running};
@@ -224,6 +223,11 @@ impl Shared {
             return Err((409, OWNED.to_owned()));
         };
         let mut room = self.room();
+        if room.explored.is_examining() {
+            let text = "the line is examined at the moment, and is closed for that; wait, or stop the examination, and \
+                        start again";
+            return Err((409, text.to_owned()));
+        }
         room.desk.look();
         room.refused_at = room.desk.version();
         // The port of the line that runs must be free for the new one.
@@ -255,49 +259,38 @@ impl Shared {
         }
     }
 
-    /// Notes that something is under way that takes longer than a request may.
-    fn begin(&self, what: &'static str) -> Result<Stop, Refusal> {
-        let mut room = self.room();
-        if room.explored.busy.is_some() {
-            return Err((
-                409,
-                "something is looked for already; wait, or stop it".to_owned(),
-            ));
+    /// Answers a question; it is under way as long as `asking` exists.
+    fn answer(&self, question: &Question, asking: Asking) {
+        match question {
+            Question::Line => self.examine(asking),
+            Question::Network(targets) => {
+                let found = search(targets, self.kinds, &asking.stop);
+                self.room().explored.found(found);
+            }
         }
-        let stop = Stop::new();
-        room.explored.busy = Some((what, stop.clone()));
-        room.turns += 1;
-        Ok(stop)
     }
 
     /// Goes along the line; a line that runs is stopped for that, and started again.
-    fn examine(&self, stop: &Stop) {
-        let path = {
+    fn examine(&self, asking: Asking) {
+        let (path, line) = {
             let mut room = self.room();
             room.turns += 1;
-            room.desk.path().to_owned()
+            (room.desk.path().to_owned(), room.line.take())
         };
-        let was_open = self.room().line.take().is_some();
+        let was_open = line.is_some();
+        // Closed while others can look.
+        drop(line);
         let steps = match Config::load(&path, self.kinds) {
-            Ok(config) => look_along(&config, stop),
+            Ok(config) => look_along(&config, &asking.stop),
             // The page shows the mistakes.
             Err(_) => Vec::new(),
         };
-        let mut room = self.room();
-        room.explored.examined(steps);
-        room.turns += 1;
-        drop(room);
+        self.room().explored.examined(steps);
+        drop(asking);
         if was_open {
             // Why not is on the page.
             let _ = self.start();
         }
-    }
-
-    fn search(&self, targets: &[Target], stop: &Stop) {
-        let found = search(targets, self.kinds, stop);
-        let mut room = self.room();
-        room.explored.found(found);
-        room.turns += 1;
     }
 
     fn stop(&self) {
@@ -362,10 +355,6 @@ impl Shared {
             }
             ("undo", _) => self.room().desk.undo(),
             ("redo", _) => self.room().desk.redo(),
-            ("save", _) => {
-                self.room().desk.save();
-                Ok(())
-            }
             ("use", index) => {
                 let mut room = self.room();
                 let index = index.parse().ok();
@@ -375,9 +364,7 @@ impl Shared {
                 room.desk.adopt(&table.ok_or_else(gone)?)
             }
             ("cancel", _) => {
-                if let Some((_, stop)) = &self.room().explored.busy {
-                    stop.stop();
-                }
+                self.room().explored.cancel();
                 Ok(())
             }
             ("line", "start") => self.start(),
@@ -395,6 +382,35 @@ impl Shared {
     }
 }
 
+/// A question under way. When this goes, even by a panic, the next one can be asked.
+struct Asking {
+    shared: Arc<Shared>,
+    stop: Stop,
+}
+
+impl Asking {
+    fn begin(shared: &Arc<Shared>, question: Question) -> Result<Self, Refusal> {
+        let stop = Stop::new();
+        let mut room = shared.room();
+        let begun = room.explored.begin(question, stop.clone());
+        begun.map_err(|why| (409, why))?;
+        room.turns += 1;
+        drop(room);
+        Ok(Self {
+            shared: Arc::clone(shared),
+            stop,
+        })
+    }
+}
+
+impl Drop for Asking {
+    fn drop(&mut self) {
+        let mut room = self.shared.room();
+        room.explored.end();
+        room.turns += 1;
+    }
+}
+
 /// A part of a path without its percent signs.
 fn decoded(text: &str) -> String {
     String::from_utf8_lossy(&tickbus_base::percent_decoded(text)).into_owned()
@@ -403,13 +419,19 @@ fn decoded(text: &str) -> String {
 struct StudioSite(Arc<Shared>);
 
 impl StudioSite {
-    /// Does something that takes longer than a request may.
-    fn later(&self, act: impl FnOnce(&Shared) + Send + 'static) {
+    /// Begins to answer a question.
+    fn ask(&self, question: Question) -> Result<(), Refusal> {
+        if question == Question::Line && matches!(self.0.owner, Owner::Simulation(_)) {
+            return Err((409, OWNED.to_owned()));
+        }
+        let asking = Asking::begin(&self.0, question.clone())?;
         let shared = Arc::clone(&self.0);
         let thread = std::thread::Builder::new().name("studio".to_owned());
-        if thread.spawn(move || act(&shared)).is_err() {
-            self.0.room().explored.busy = None;
-        }
+        let begun = thread.spawn(move || shared.answer(&question, asking));
+        begun.map(drop).map_err(|error| {
+            let text = format!("the system starts no thread ({error}); end other programs");
+            (503, text)
+        })
     }
 
     /// Answers on a thread of its own: a file on a slow disk, or a line that closes, must not stop other viewers.
@@ -480,30 +502,10 @@ impl Site for StudioSite {
             self.0.live.change(change, answer);
             return;
         }
-        let asked = match change.path.as_str() {
-            "/studio/examine" if matches!(self.0.owner, Owner::Simulation(_)) => {
-                Some(Err((409, OWNED.to_owned())))
-            }
-            "/studio/examine" => Some(self.0.begin("examine").map(|stop| (Vec::new(), stop))),
-            "/studio/find" => Some(
-                targets(&change.body)
-                    .map_err(|why| (400, why))
-                    .and_then(|targets| Ok((targets, self.0.begin("find")?))),
-            ),
-            _ => None,
-        };
-        if let Some(asked) = asked {
-            let refused = |(status, text)| Refused { status, text };
-            match asked {
-                Err(why) => answer.give(Err(refused(why))),
-                Ok((targets, stop)) => {
-                    answer.give(Ok(()));
-                    self.later(move |shared| match targets.as_slice() {
-                        [] => shared.examine(&stop),
-                        targets => shared.search(targets, &stop),
-                    });
-                }
-            }
+        if let Some(asked) = Question::asked(&change.path, &change.body) {
+            let begun = asked.map_err(|why| (400, why));
+            let begun = begun.and_then(|question| self.ask(question));
+            answer.give(begun.map_err(|(status, text)| Refused { status, text }));
             return;
         }
         self.apart(answer, move |shared| {
@@ -512,3 +514,7 @@ impl Site for StudioSite {
         });
     }
 }
+
+#[cfg(test)]
+#[path = "site_tests.rs"]
+mod tests;

@@ -143,7 +143,9 @@
     const line = driver?.line;
     const runs = file?.line.runs ?? false;
     get("start").textContent = runs ? (file.line.isOld ? "Restart with the changes" : "Restart") : "Start";
-    get("start").disabled = !mayEdit || (file?.checked.mistakes.length ?? 1) > 0;
+    const isExamined = file?.explored.busy === "examine";
+    get("start").disabled = !mayEdit || isExamined || (file?.checked.mistakes.length ?? 1) > 0;
+    get("start").title = isExamined ? "The line is examined at the moment" : "";
     get("stop").hidden = !runs;
     get("stop").disabled = !mayEdit;
     let state = "stopped";

@@ -8,8 +8,9 @@ use tickbus_base::toml_text::{Mistakes, shown};
 use tickbus_driver_cfg::Kinds;
 use tickbus_image::signal::{Address, Addressing};
 use tickbus_import::{ImportOptions, condensed, import};
-use toml_edit::{ArrayOfTables, Document, DocumentMut, Item, Table};
+use toml_edit::{ArrayOfTables, DocumentMut, Item, Table};
 
+use crate::document::{self, parsed};
 use crate::edit::kind;
 use crate::layout;
 use crate::literal::cell;
@@ -37,11 +38,7 @@ pub(crate) fn add(
         Mistakes::of_list(mistakes.file(), condensed(&list)).to_string()
     })?;
     let mut new = parsed(&imported.text)?;
-    let (mark, body) = match text.strip_prefix('\u{feff}') {
-        Some(body) => ("\u{feff}", body),
-        None => ("", text),
-    };
-    let mut document = parsed(body)?;
+    let mut document = parsed(text)?;
     align(&mut document, &mut new)?;
     let (added, known) = append(&mut document, &new)?;
     // Writing to a text cannot fail.
@@ -56,8 +53,7 @@ pub(crate) fn add(
     for note in &imported.notes {
         let _ = write!(told, "\n{note}");
     }
-    let text = layout::ends_as(text, document.to_string());
-    Ok((format!("{mark}{text}"), told))
+    Ok((document::written(text, &document), told))
 }
 
 /// Gives the addresses of `new` the unit of the document; a document without signals gets that of `new`.
@@ -99,14 +95,6 @@ fn align(document: &mut DocumentMut, new: &mut DocumentMut) -> Result<(), String
         }
     }
     Ok(())
-}
-
-fn parsed(text: &str) -> Result<DocumentMut, String> {
-    let document = Document::parse(text).map_err(|error| {
-        let what = error.message();
-        format!("the file is no TOML at the moment ({what}); mend that in its text first")
-    })?;
-    Ok(document.into_mut())
 }
 
 /// Returns how many signals were added, and how many were there.

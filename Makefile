@@ -1,6 +1,6 @@
 # The commands of this project. tools/ has the scripts; this file gives them their names.
 
-.PHONY: help demo demo-lab demo-peeler demo-profibus demo-robot demo-cell test platforms python bench soak worlds storm lint dist release build setup clean
+.PHONY: help book demo demo-lab demo-peeler demo-profibus demo-robot demo-cell test platforms python bench soak worlds storm lint dist release build setup clean
 .DEFAULT_GOAL := help
 
 help: ## this list
@@ -56,6 +56,9 @@ dist: setup ## a zip with the DeviceDriver folder and the simulator; needs only 
 
 release: setup ## everything that a release has, for all platforms, and each part tried
 	@exec tools/release/all
+
+book: ## the documents as a site with a search, in target/book; needs no build of tickbus
+	@exec tools/book
 
 build: setup ## the native library, the tickbus command and the jars
 	@exec tools/build

@@ -28,13 +28,19 @@ const TICK: Nanos = Nanos::from_millis(1);
 /// REALs each way.
 const SIGNALS: usize = 1_000;
 
-/// No page at all, and the numbers of viewers of one.
-const PHASES: [(&str, Option<usize>); 4] = [
+/// No page at all; a page without a recording in memory; and the numbers of viewers of one with it.
+const PHASES: [(&str, Shown); 5] = [
     ("without", None),
-    ("viewers_0", Some(0)),
-    ("viewers_1", Some(1)),
-    ("viewers_20", Some(20)),
+    ("no_history", Some((0, "0"))),
+    ("viewers_0", Some((0, HISTORY))),
+    ("viewers_1", Some((1, HISTORY))),
+    ("viewers_20", Some((20, HISTORY))),
 ];
+
+/// The viewers of a page and the memory of its history, or no page.
+type Shown = Option<(usize, &'static str)>;
+
+const HISTORY: &str = "\"64 MB\"";
 
 fn main() {
     // `cargo bench` passes this; `cargo test` only checks that the bench runs.
@@ -44,11 +50,11 @@ fn main() {
     } else {
         (1, Duration::from_millis(50))
     };
-    let rounds: Vec<[[f64; 2]; 4]> = (0..rounds)
-        .map(|_| PHASES.map(|(_, viewers)| phase(viewers, span)))
+    let rounds: Vec<[[f64; 2]; 5]> = (0..rounds)
+        .map(|_| PHASES.map(|(_, shown)| phase(shown, span)))
         .collect();
     for (at, (name, _)) in PHASES.iter().enumerate() {
-        let over_rounds = |of: &dyn Fn(&[[f64; 2]; 4]) -> f64| {
+        let over_rounds = |of: &dyn Fn(&[[f64; 2]; 5]) -> f64| {
             let mut values: Vec<f64> = rounds.iter().map(of).collect();
             median(&mut values)
         };
@@ -57,15 +63,17 @@ fn main() {
         let ratio = over_rounds(&|round| round[at][0] / round[0][0]);
         println!("rust page.{name}.tick_p50_us {p50:.2}");
         println!("rust page.{name}.tick_p99_us {p99:.2}");
+        let tail = over_rounds(&|round| round[at][1] / round[0][1]);
         println!("rust page.{name}.ratio {ratio:.3}");
+        println!("rust page.{name}.ratio_p99 {tail:.3}");
     }
     all_change(span * 2);
     edges(span * 4);
 }
 
-/// Ticks with this many viewers of a page, or without one: median and 99 % of how long an exchange takes, in microseconds.
-fn phase(viewers: Option<usize>, span: Duration) -> [f64; 2] {
-    let mut cell = Cell::open(viewers);
+/// Ticks with a page, or without one: median and 99 % of how long an exchange takes, in microseconds.
+fn phase(shown: Shown, span: Duration) -> [f64; 2] {
+    let mut cell = Cell::open(shown);
     let ticks = cell.tick(span, |tick, slots| change(tick, &mut slots[..SIGNALS / 10]));
     [0.5, 0.99].map(|share| ticks.quantile(share).as_micros())
 }
@@ -104,10 +112,13 @@ impl Drop for Cell {
 
 impl Cell {
     /// With a page and this many viewers who drop what they read; `None` for no page.
-    fn open(viewers: Option<usize>) -> Self {
+    fn open(shown: Shown) -> Self {
         let mut text = "[driver]\nid = 1\nname = \"bench\"\n[fieldbus]\nkind = \"loopback\"\nprogram = \"mirror\"\n\
                         scan = \"1ms\"\ncycle = \"1ms\"\n"
             .to_owned();
+        if let Some((_, history)) = shown {
+            let _ = write!(text, "[page]\nhistory = {history}\n");
+        }
         for area in ['I', 'Q'] {
             for signal in 0..SIGNALS {
                 let _ = write!(
@@ -121,7 +132,7 @@ impl Cell {
             .unwrap_or_else(|why| panic!("{why}"));
         let mut driver = Driver::open(config, Monotonic::shared()).expect("opens");
         let slots = driver.initial_slots();
-        let page = viewers.map(|_| {
+        let page = shown.map(|_| {
             let page = LivePage::open(Monotonic::shared()).expect("a thread");
             let room = Room::bind(&Address::local(0), Limits::default()).expect("a port");
             let address = room.address();
@@ -142,7 +153,7 @@ impl Cell {
             page,
             viewers: Vec::new(),
         };
-        for _ in 0..viewers.unwrap_or(0) {
+        for _ in 0..shown.map_or(0, |(viewers, _)| viewers) {
             cell.view(|_| {});
         }
         cell
@@ -211,7 +222,7 @@ fn stay_on_one_core() {}
 
 /// All signals of one direction change in every tick, and come back: the bytes of one viewer.
 fn all_change(span: Duration) {
-    let mut cell = Cell::open(Some(0));
+    let mut cell = Cell::open(Some((0, HISTORY)));
     let (bytes, events) = (Arc::<AtomicU64>::default(), Arc::<AtomicU64>::default());
     let counted = (Arc::clone(&bytes), Arc::clone(&events));
     cell.view(move |heard| {
@@ -234,7 +245,7 @@ fn all_change(span: Duration) {
 /// One value changes now and then: how long until a viewer has the event, after the exchange in which it changed.
 fn edges(span: Duration) {
     const EVERY: u64 = 97;
-    let mut cell = Cell::open(Some(0));
+    let mut cell = Cell::open(Some((0, HISTORY)));
     let clock = Monotonic::shared();
     let written = Arc::new(AtomicI64::new(0));
     let spans = Arc::new(std::sync::Mutex::new(TimeHistogram::new()));

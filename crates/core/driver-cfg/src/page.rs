@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use tickbus_base::time::Nanos;
-use tickbus_base::toml_text::{Key, Shape, Table, Value};
+use tickbus_base::toml_text::{Key, Shape, Table, Value, shown};
 use tickbus_net::{Address, Host};
 
 /// The default port of a page.
@@ -14,6 +14,12 @@ const GRACE: Nanos = Nanos::from_secs(10);
 
 /// The shortest time that can be stated: reloading a page interrupts it for a moment.
 const LEAST_GRACE: Nanos = Nanos::from_secs(1);
+
+/// The default memory of the history, in bytes.
+const HISTORY: usize = 64 << 20;
+
+/// The least and the most memory that the history can have, in MB.
+const HISTORY_MB: std::ops::RangeInclusive<usize> = 1..=4096;
 
 /// The longest path of a picture, in characters.
 const PATH_LIMIT: usize = 1000;
@@ -54,6 +60,12 @@ pub(crate) const KEYS: &[Key] = &[
         "true: the page edits this file, and the line takes its changes; on this computer alone",
     )
     .or("false"),
+    Key::new(
+        "history",
+        Shape::Any(&[Shape::Pattern("[0-9]+ ?[MG]B"), Shape::Whole(0, 0)]),
+        "The memory for every change of the last ticks, which the bar of time shows; 0 switches it off",
+    )
+    .or("\"64 MB\""),
 ];
 
 /// The live page of a driver.
@@ -69,6 +81,8 @@ pub struct PageOptions {
     pub token_file: Option<PathBuf>,
     /// True if the page edits the driver.cfg; the page then listens [on this computer alone](Self::listens_here).
     pub edit: bool,
+    /// The memory for the ticks that the bar of time shows, in bytes; 0 for none.
+    pub history: usize,
 }
 
 impl Default for PageOptions {
@@ -80,19 +94,21 @@ impl Default for PageOptions {
             picture: None,
             token_file: None,
             edit: false,
+            history: HISTORY,
         }
     }
 }
 
 impl PageOptions {
     pub(super) fn read(mut table: Table<'_>) -> Option<Self> {
-        let [listen, grace, keep_forced, picture, token_file, edit] = [
+        let [listen, grace, keep_forced, picture, token_file, edit, history] = [
             "listen",
             "grace",
             "keep_forced",
             "picture",
             "token_file",
             "edit",
+            "history",
         ]
         .map(|key| table.take(key));
         table.finish();
@@ -158,6 +174,7 @@ impl PageOptions {
                 Some(file) => Some(file?),
             },
             edit: edits?,
+            history: history.map_or(Some(usual.history), |value| history_of(&value))?,
         })
     }
 
@@ -172,6 +189,33 @@ impl PageOptions {
             Host::Name(name) => name.eq_ignore_ascii_case("localhost"),
         }
     }
+}
+
+/// The memory of the history in bytes, written as `64 MB`, `1 GB` or 0.
+fn history_of(value: &Value<'_>) -> Option<usize> {
+    let right = format!(
+        "write the memory in quotes with its unit, from \"{} MB\" to \"{} GB\", or 0 for no history",
+        HISTORY_MB.start(),
+        HISTORY_MB.end() / 1024
+    );
+    if value.is_integer() && value.written() == "0" {
+        return Some(0);
+    }
+    let text = value.text(&right)?;
+    let in_unit = |unit, factor| {
+        let number: &str = text.strip_suffix(unit)?;
+        let number = number.strip_suffix(' ').unwrap_or(number);
+        let is_plain = number.bytes().all(|byte| byte.is_ascii_digit());
+        let number = number.parse::<usize>().ok().filter(|_| is_plain)?;
+        number.checked_mul(factor)
+    };
+    let megabytes = in_unit("MB", 1).or_else(|| in_unit("GB", 1024));
+    let megabytes = megabytes.filter(|megabytes| HISTORY_MB.contains(megabytes));
+    if megabytes.is_none() {
+        let what = format!("\"{}\" is no memory for the history", shown(text));
+        value.wrong(what, right);
+    }
+    megabytes?.checked_mul(1 << 20)
 }
 
 #[cfg(test)]
@@ -208,6 +252,15 @@ mod tests {
             let page = read(&format!("[page]\nlisten = \"{listen}\"\nedit = true\n"));
             assert!(page.expect("right").expect("there").edit, "{listen}");
         }
+        for (history, bytes) in [
+            ("\"1 MB\"", 1 << 20),
+            ("\"2GB\"", 2 << 30),
+            ("0", 0),
+            ("\"64 MB\"", HISTORY),
+        ] {
+            let page = read(&format!("[page]\nhistory = {history}\n")).expect("right");
+            assert_eq!(page.expect("there").history, bytes, "{history}");
+        }
         let keeps = read("[page]\nkeep_forced = true\n").expect("right");
         assert_eq!(keeps.expect("there").grace, None);
     }
@@ -233,6 +286,18 @@ mod tests {
                 "[page]\nlisten = \"labpc:80\"\nedit = true\n",
                 "other computers",
             ),
+            ("[page]\nhistory = 64\n", "driver.cfg:11:11: "),
+            ("[page]\nhistory = \"64\"\n", "is no memory for the history"),
+            ("[page]\nhistory = \"5 GB\"\n", "from \"1 MB\" to \"4 GB\""),
+            (
+                "[page]\nhistory = \"-1 MB\"\n",
+                "is no memory for the history",
+            ),
+            (
+                "[page]\nhistory = \"1 KB\"\n",
+                "is no memory for the history",
+            ),
+            ("[page]\nhistory = \"é\"\n", "is no memory for the history"),
             ("[page]\npicture = \"rig.png\"\n", "does not end in .svg"),
             (
                 "[page]\npictures = \"rig.svg\"\n",

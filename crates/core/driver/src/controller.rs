@@ -12,7 +12,7 @@ use super::bus_handle::{OpenBus, SteppedBus};
 use super::host::{HostThread, ScanSetup, check_fit};
 use super::line::Line;
 use super::open::swallowed_of;
-use super::recording::recorder;
+use super::recording::{recorder, remember};
 use super::watch::Watch;
 use super::{DriverError, SlotMap, bus, real_time};
 use tickbus_driver_cfg::Config;
@@ -94,11 +94,13 @@ impl Host {
         };
         let map = SlotMap::new(&config.table, config.role);
         let is_stepped = matches!(bus, Bus::Stepped(_));
+        let mut recorder = recorder(config, &map, None, is_stepped, &clock)?;
+        remember(config, &map, None, &mut recorder, (is_stepped, &clock))?;
         let hosted = ScanSetup {
             program,
             interval,
             has_watchdog,
-            recorder: recorder(config, &map, None, is_stepped, &clock)?,
+            recorder,
             swallowed,
         };
         HostThread::start(hosted, (config, config.role), (bus, stop), clock).map(Self)

@@ -32,6 +32,8 @@ pub struct Driver {
     pub(super) stations: Vec<Station>,
     pub(super) line: BusHandle,
     pub(super) clock: Arc<dyn Clock>,
+    /// The clock that the driver was opened with, which other threads wait on.
+    pub(super) real: Arc<dyn Clock>,
     /// The same clock, read quickly for the tick.
     pub(super) quick: QuickClock,
     pub(super) max_age: MaxAge,

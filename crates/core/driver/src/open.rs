@@ -52,6 +52,7 @@ impl Driver {
             &clock,
         )?;
         let simulation_time = Manual::new();
+        let real = Arc::clone(&clock);
         let clock = match &bus {
             OpenBus::Free(_) => clock,
             OpenBus::Stepped(_) => Arc::clone(&simulation_time) as _,
@@ -81,6 +82,7 @@ impl Driver {
             quick,
             clock,
             max_age: status.limit(),
+            real,
             status,
             counters: TickCounters::default(),
             samples: TickTimes::default(),

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use tickbus_base::time::{Clock, Nanos};
 use tickbus_image::signal::Area;
-use tickbus_record::{Columns, Recorder, Rows, When};
+use tickbus_record::{Columns, History, Recorder, RecorderError, Rows, When};
 
 use super::{DriverError, SlotMap};
 use tickbus_driver_cfg::Config;
@@ -21,18 +21,46 @@ pub(super) fn recorder(
     let Some(options) = wanted.filter(|options| options.when == When::Always) else {
         return Ok(None);
     };
-    let columns = Columns::new(
-        &config.name,
-        config.role.name(),
-        &config.table,
-        &slots.edges,
-    );
-    let rows = match sent {
-        Some(area) => Rows::sending(columns, &config.table, area),
-        None => columns.into(),
-    };
+    let rows = rows(config, slots, sent);
     let recorder = Recorder::start(options, config.folder(), rows, lossless, clock)?;
     Ok(Some(recorder))
+}
+
+fn columns(config: &Config, slots: &SlotMap) -> Columns {
+    let role = config.role.name();
+    Columns::new(&config.name, role, &config.table, &slots.edges)
+}
+
+fn rows(config: &Config, slots: &SlotMap, sent: Option<Area>) -> Rows {
+    let columns = columns(config, slots);
+    match sent {
+        Some(area) => Rows::sending(columns, &config.table, area),
+        None => columns.into(),
+    }
+}
+
+/// Lets the recorder feed a history, if the live page of `config` has one; without a recorder, starts one for that.
+pub(super) fn remember(
+    config: &Config,
+    slots: &SlotMap,
+    sent: Option<Area>,
+    recorder: &mut Option<Recorder>,
+    (lossless, clock): (bool, &Arc<dyn Clock>),
+) -> Result<(), RecorderError> {
+    let limit = config.page.as_ref().map_or(0, |page| page.history);
+    if limit == 0 {
+        return Ok(());
+    }
+    let history = || Arc::new(History::new(columns(config, slots), limit));
+    match recorder {
+        Some(recorder) if recorder.history().is_some() => {}
+        Some(recorder) => recorder.remember(history()),
+        none => {
+            let rows = rows(config, slots, sent);
+            *none = Some(Recorder::in_memory(history(), rows, lossless, clock)?);
+        }
+    }
+    Ok(())
 }
 
 /// The ticks that a recording has so far. After a reset, ticks and simulation time continue where the recording was.

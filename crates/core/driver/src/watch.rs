@@ -11,6 +11,7 @@ use tickbus_fieldbus::faults::{
 };
 use tickbus_fieldbus::{Link, Role};
 use tickbus_image::signal::{Area, Slot};
+use tickbus_record::History;
 
 use super::SlotMap;
 use super::statistics::{Figures, TickFigures};
@@ -31,6 +32,7 @@ pub struct Watch {
     clock: Arc<dyn Clock>,
     /// The data that the copies of the ticks do not contain.
     figures: Figures,
+    history: Option<Arc<History>>,
     is_driver: bool,
     /// The distributions that arrived last.
     times: TickTimes,
@@ -43,7 +45,7 @@ impl Watch {
     pub(super) fn new(
         config: Arc<Config>,
         clock: Arc<dyn Clock>,
-        figures: Figures,
+        (figures, history): (Figures, Option<Arc<History>>),
         is_driver: bool,
     ) -> (Tap, Self) {
         let table = &config.table;
@@ -56,6 +58,7 @@ impl Watch {
             handle,
             clock,
             figures,
+            history,
             is_driver,
             times: TickTimes::default(),
             asked: None,
@@ -87,6 +90,11 @@ impl Watch {
     /// Returns true for a simulation's driver, and false for a PLC program.
     pub fn is_driver(&self) -> bool {
         self.is_driver
+    }
+
+    /// Returns the recording of the ticks in memory, if the live page of the driver.cfg has one.
+    pub fn history(&self) -> Option<&Arc<History>> {
+        self.history.as_ref()
     }
 
     /// Returns the clock of the line, on which [`View::now`] and [`Link::since`] are. On a stepped bus that is

@@ -4,8 +4,10 @@ use std::sync::Arc;
 
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::Slot;
+use tickbus_record::Recorder;
 
 use super::bus_handle::{BusHandle, SteppedBus};
+use super::recording::remember;
 use super::tick::Tick;
 use super::view::{StationView, View};
 use super::watch::Watch;
@@ -14,10 +16,30 @@ use super::{Code, Driver};
 impl Driver {
     /// Lets another thread look at this driver and force its signals. While the watch asks for nothing, a tick only
     /// checks one word. An earlier handle receives nothing new from now on.
+    ///
+    /// If the live page of the driver.cfg has a history, the ticks are recorded in memory from now on; without memory
+    /// or a thread for it, the driver runs on without one.
     pub fn watch(&mut self) -> Watch {
         self.extras.make_room(&self.board);
         let (config, clock) = (Arc::clone(&self.config), Arc::clone(&self.clock));
-        let (tap, watch) = Watch::new(config, clock, self.figures(), true);
+        let (sent, stepped) = (Some(config.role.areas().0), self.is_stepped());
+        let remembered = remember(
+            &config,
+            &self.slots,
+            sent,
+            &mut self.recorder,
+            (stepped, &self.real),
+        );
+        if let Err(error) = remembered {
+            log::warn!(
+                "driver \"{}\": the live page has no history: {error}",
+                config.name
+            );
+        }
+        self.shape = self.fitting_shape();
+        let history = self.recorder.as_ref().and_then(Recorder::history);
+        let history = history.map(Arc::clone);
+        let (tap, watch) = Watch::new(config, clock, (self.figures(), history), true);
         self.tap = Some(tap);
         watch
     }

@@ -2,11 +2,12 @@
 //!
 //! A [`Recorder`] takes whole ticks from the ticking thread through a ring that never blocks that thread, and its own
 //! thread writes them to a file: VCD, which every waveform viewer opens, or CSV. A [`Recording`] reads such a file
-//! back, tick by tick.
+//! back, tick by tick. A [`History`] keeps ticks in memory instead, from the same thread.
 
 mod columns;
 mod csv;
 mod file;
+mod history;
 mod options;
 mod places;
 mod reading;
@@ -26,6 +27,7 @@ mod vcd;
 mod tests;
 
 pub use columns::{Column, Columns, Tick, ValueKind};
+pub use history::{Goal, History, Moment, Span, TrendPoint};
 pub use options::{FILE_SHAPE, Format, Options, When, file_of};
 pub use places::FileClaim;
 pub use reading::{MOST_COLUMNS, Recording, RecordingError};

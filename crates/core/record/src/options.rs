@@ -146,9 +146,14 @@ impl Options {
         let bytes = words.max(1) * size_of::<u64>();
         match self.ring {
             Some(ticks) => within(ticks.next_power_of_two(), MOST_RING_BYTES / bytes),
-            None => within(TICKS, RING_BYTES / bytes).max(16),
+            None => usual_ticks(words),
         }
     }
+}
+
+/// The usual capacity of the ring for ticks of `words` words each.
+pub(super) fn usual_ticks(words: usize) -> usize {
+    within(TICKS, RING_BYTES / (words.max(1) * size_of::<u64>())).max(16)
 }
 
 /// A power of two, halved until it is at most `most`, or 1.

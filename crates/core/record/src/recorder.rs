@@ -3,16 +3,17 @@
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use super::columns::{Columns, Tick};
 use super::csv::CsvSink;
 use super::file::{Out, SimulatedFile, Target};
+use super::history::History;
 use super::places::FileClaim;
 use super::rows::Rows;
 use super::sink::Sink;
 use super::vcd::VcdSink;
-use super::{Format, Options};
+use super::{Format, Options, options};
 use tickbus_base::statistics::Statistics;
 use tickbus_base::thread::Thread;
 use tickbus_base::time::{Clock, Nanos, Stop};
@@ -48,7 +49,8 @@ impl Format {
 /// Counters of a recorder; readable from any thread.
 #[derive(Debug, Default)]
 pub struct RecorderCounters {
-    file: PathBuf,
+    /// `None` for a recording in memory alone.
+    file: Option<PathBuf>,
     /// Ticks that were written.
     ticks: AtomicU64,
     /// Ticks dropped because the ring was full.
@@ -69,8 +71,11 @@ impl RecorderCounters {
 
     /// Adds the counters.
     pub fn write(&self, statistics: &mut Statistics) {
+        let Some(file) = &self.file else {
+            return;
+        };
         let count = |count: &AtomicU64| count.load(Ordering::Relaxed);
-        statistics.text("record.file", &self.file.display().to_string());
+        statistics.text("record.file", &file.display().to_string());
         statistics.count("record.ticks", count(&self.ticks));
         statistics.count("record.dropped", count(&self.dropped));
         let backwards = count(&self.backwards);
@@ -80,6 +85,15 @@ impl RecorderCounters {
         if let Some(error) = self.error() {
             statistics.text("record.error", &error);
         }
+    }
+
+    /// The file, or what takes its place, for the log.
+    fn name(&self) -> String {
+        let file = self.file.as_ref();
+        file.map_or_else(
+            || "the recording in memory".to_owned(),
+            |file| file.display().to_string(),
+        )
     }
 
     fn lock_error(&self) -> MutexGuard<'_, Option<String>> {
@@ -154,6 +168,7 @@ pub struct Recorder {
     slots: usize,
     lossless: bool,
     scans: Arc<RecorderCounters>,
+    history: Arc<OnceLock<Arc<History>>>,
     bell: Arc<Bell>,
     pub(super) close_timeout: Nanos,
     clock: Arc<dyn Clock>,
@@ -250,6 +265,37 @@ impl Recorder {
             .map_err(RecorderError::Thread)
     }
 
+    /// Starts a recording that only feeds `history`, without a file.
+    ///
+    /// # Errors
+    ///
+    /// The system refused a thread.
+    pub fn in_memory(
+        history: Arc<History>,
+        rows: Rows,
+        lossless: bool,
+        clock: &Arc<dyn Clock>,
+    ) -> Result<Self, RecorderError> {
+        let columns = &rows.columns;
+        let words = HEAD + columns.stations.len() + columns.columns.len();
+        let recorder = Self::spawn(None, rows, options::usual_ticks(words), lossless, clock);
+        let recorder = recorder.map_err(RecorderError::Thread)?;
+        recorder.remember(history);
+        Ok(recorder)
+    }
+
+    /// Feeds `history` as well, from the next look at the ring on. A recorder feeds one history at most: a second one
+    /// gets nothing.
+    pub fn remember(&self, history: Arc<History>) {
+        // The first one stays.
+        let _ = self.history.set(history);
+    }
+
+    /// The history that it feeds.
+    pub fn history(&self) -> Option<&Arc<History>> {
+        self.history.get()
+    }
+
     /// Like [`start`](Self::start), for any target.
     pub(super) fn over(
         target: Box<dyn Target>,
@@ -260,28 +306,45 @@ impl Recorder {
         (path, place): (PathBuf, Option<FileClaim>),
         clock: &Arc<dyn Clock>,
     ) -> std::io::Result<Self> {
+        let written = Written {
+            sink: format.sink(rows.columns.clone()),
+            has_begun: false,
+            out: Out::new(target),
+            place,
+        };
+        Self::spawn(Some((path, written)), rows, ticks, lossless, clock)
+    }
+
+    /// Starts the thread; without a file, for a history alone.
+    fn spawn(
+        file: Option<(PathBuf, Written)>,
+        rows: Rows,
+        ticks: usize,
+        lossless: bool,
+        clock: &Arc<dyn Clock>,
+    ) -> std::io::Result<Self> {
         let columns = &rows.columns;
         let head = HEAD + columns.stations.len();
         let slots = columns.columns.len();
         let (ring, reader) = row_ring(ticks, head + slots);
         let bell = Arc::new(Bell::default());
+        let (path, file) = file.unzip();
         let scans = Arc::new(RecorderCounters {
             file: path,
             ..RecorderCounters::default()
         });
+        let history = Arc::<OnceLock<Arc<History>>>::default();
         let mut writing = Writing {
             ring: reader,
             words: vec![0; head + slots].into(),
             tick: Tick::new(columns),
             kinds: columns.columns.iter().map(|column| column.kind).collect(),
-            sink: format.sink(columns.clone()),
             rows,
-            has_begun: false,
-            out: Out::new(target),
+            file,
+            history: Arc::clone(&history),
             before: None,
             scans: Arc::clone(&scans),
             bell: Arc::clone(&bell),
-            place,
             clock: Arc::clone(clock),
         };
         let thread = Thread::spawn(&**clock, "record", move || writing.run())?;
@@ -291,6 +354,7 @@ impl Recorder {
             slots,
             lossless,
             scans,
+            history,
             bell,
             close_timeout: CLOSE_TIMEOUT,
             clock: Arc::clone(clock),
@@ -369,7 +433,7 @@ impl Drop for Recorder {
                 log::error!(
                     "{}: the file has taken nothing for {}, and the thread that records is left behind; the \
                      recording may lack its end, see whether its disc answers",
-                    self.scans.file.display(),
+                    self.scans.name(),
                     self.close_timeout
                 );
                 return;
@@ -377,83 +441,21 @@ impl Drop for Recorder {
             before = ticks;
         }
         if !thread.join() {
-            log::error!("{}: the recording panicked", self.scans.file.display());
+            log::error!("{}: the recording panicked", self.scans.name());
         }
     }
 }
 
-/// The thread's half of a recorder.
-struct Writing {
-    ring: RowReader,
-    words: Box<[u64]>,
-    tick: Tick,
-    kinds: Box<[super::ValueKind]>,
+/// A file that is being written.
+struct Written {
     sink: Box<dyn Sink>,
-    rows: Rows,
     /// The file has the beginning of this recording, or will have it with the next flush.
     has_begun: bool,
     out: Out,
-    /// Number and time of the previous tick.
-    before: Option<(u64, Nanos)>,
-    scans: Arc<RecorderCounters>,
-    bell: Arc<Bell>,
     place: Option<FileClaim>,
-    clock: Arc<dyn Clock>,
 }
 
-impl Writing {
-    fn run(&mut self) {
-        // After this thread has ended, for any reason, no tick may wait for it.
-        let (scans, bell) = (Arc::clone(&self.scans), Arc::clone(&self.bell));
-        let _end = Ended { scans, bell };
-        if let Err(error) = self.write() {
-            let ticks = self.out.ticks();
-            let why = format!("the recording ended with tick {ticks} of the file: {error}");
-            self.scans.ticks.store(ticks, Ordering::Relaxed);
-            // There may be room for a short comment even if there was none for a tick.
-            if self.out.has_begun() {
-                self.sink.end(&why, self.out.buffer());
-                self.out.whole(ticks);
-                let _ = self.out.flush();
-            }
-            log::error!(
-                "{}: {why}; the run goes on without it; free some space and open the driver again",
-                self.scans.file.display()
-            );
-            *self.scans.lock_error() = Some(why);
-        }
-    }
-
-    fn write(&mut self) -> std::io::Result<()> {
-        let mut looks = 0;
-        loop {
-            let stopped = self.bell.lock().stop;
-            self.drain()?;
-            looks += 1;
-            if stopped {
-                break;
-            }
-            if looks % LOOKS_PER_FLUSH == 0 {
-                self.out.flush()?;
-            }
-            self.bell.wait(&*self.clock);
-        }
-        if !self.has_begun {
-            // A run without a tick keeps the recording of an earlier one.
-            if self.place.as_ref().is_some_and(|place| !place.is_empty()) {
-                return Ok(());
-            }
-            self.begin()?;
-        }
-        let scans = &self.scans;
-        let ticks = scans.ticks.load(Ordering::Relaxed);
-        let dropped = scans.dropped.load(Ordering::Relaxed);
-        let note = format!("ticks={ticks} dropped={dropped}");
-        self.sink.end(&note, self.out.buffer());
-        self.out.whole(ticks);
-        self.out.flush()
-    }
-
+impl Written {
     /// Begins the file.
     fn begin(&mut self) -> std::io::Result<()> {
         if let Some(place) = &self.place {
@@ -465,19 +467,117 @@ impl Writing {
         Ok(())
     }
 
+    /// Ends the file of a run that had these ticks.
+    fn end(&mut self, ticks: u64, dropped: u64) -> std::io::Result<()> {
+        if !self.has_begun {
+            // A run without a tick keeps the recording of an earlier one.
+            if self.place.as_ref().is_some_and(|place| !place.is_empty()) {
+                return Ok(());
+            }
+            self.begin()?;
+        }
+        let note = format!("ticks={ticks} dropped={dropped}");
+        self.sink.end(&note, self.out.buffer());
+        self.out.whole(ticks);
+        self.out.flush()
+    }
+}
+
+/// The thread's half of a recorder.
+struct Writing {
+    ring: RowReader,
+    words: Box<[u64]>,
+    tick: Tick,
+    kinds: Box<[super::ValueKind]>,
+    rows: Rows,
+    /// `None` without a file, or once it takes no more.
+    file: Option<Written>,
+    history: Arc<OnceLock<Arc<History>>>,
+    /// Number and time of the previous tick.
+    before: Option<(u64, Nanos)>,
+    scans: Arc<RecorderCounters>,
+    bell: Arc<Bell>,
+    clock: Arc<dyn Clock>,
+}
+
+impl Writing {
+    fn run(&mut self) {
+        // After this thread has ended, for any reason, no tick may wait for it.
+        let (scans, bell) = (Arc::clone(&self.scans), Arc::clone(&self.bell));
+        let _end = Ended { scans, bell };
+        while let Err(error) = self.write() {
+            self.give_up_file(&error);
+            // A history goes on without the file.
+            if self.history.get().is_none() {
+                return;
+            }
+        }
+    }
+
+    /// Ends the file because of an error.
+    fn give_up_file(&mut self, error: &std::io::Error) {
+        let Some(mut file) = self.file.take() else {
+            return;
+        };
+        let ticks = file.out.ticks();
+        let why = format!("the recording ended with tick {ticks} of the file: {error}");
+        self.scans.ticks.store(ticks, Ordering::Relaxed);
+        // There may be room for a short comment even if there was none for a tick.
+        if file.out.has_begun() {
+            file.sink.end(&why, file.out.buffer());
+            file.out.whole(ticks);
+            let _ = file.out.flush();
+        }
+        log::error!(
+            "{}: {why}; the run goes on without it; free some space and open the driver again",
+            self.scans.name()
+        );
+        *self.scans.lock_error() = Some(why);
+    }
+
+    fn write(&mut self) -> std::io::Result<()> {
+        let mut looks = 0;
+        loop {
+            let stopped = self.bell.lock().stop;
+            self.drain()?;
+            looks += 1;
+            if stopped {
+                break;
+            }
+            if looks % LOOKS_PER_FLUSH == 0
+                && let Some(file) = &mut self.file
+            {
+                file.out.flush()?;
+            }
+            self.bell.wait(&*self.clock);
+        }
+        let ticks = self.scans.ticks.load(Ordering::Relaxed);
+        let dropped = self.scans.dropped.load(Ordering::Relaxed);
+        match &mut self.file {
+            Some(file) => file.end(ticks, dropped),
+            None => Ok(()),
+        }
+    }
+
     /// Writes everything that the ring holds.
     fn drain(&mut self) -> std::io::Result<()> {
         while self.ring.take(&mut self.words) {
-            if !self.has_begun {
-                self.begin()?;
-            }
             self.unpack();
-            self.sink.tick(&self.tick, self.out.buffer());
+            if let Some(history) = self.history.get() {
+                history.push(&self.tick);
+            }
+            let Some(file) = &mut self.file else {
+                continue;
+            };
+            if !file.has_begun {
+                file.begin()?;
+            }
+            file.sink.tick(&self.tick, file.out.buffer());
             let ticks = self.scans.ticks.fetch_add(1, Ordering::Relaxed) + 1;
-            self.out.whole(ticks);
-            if self.out.pending() >= CHUNK {
+            file.out.whole(ticks);
+            if file.out.pending() >= CHUNK {
                 self.bell.room.notify_one();
-                self.out.flush()?;
+                file.out.flush()?;
             }
         }
         self.bell.room.notify_one();
@@ -510,7 +610,7 @@ impl Writing {
             log::warn!(
                 "{}: ticks are dropped, since they come faster than they can be written; the recording has \
                  gaps, record.dropped counts them; write a larger ring in [record]",
-                self.scans.file.display()
+                self.scans.name()
             );
         }
         tick.dropped += gap;
@@ -520,7 +620,7 @@ impl Writing {
                 log::warn!(
                     "{}: simulation time went back from {time} to {} in tick {}; the recording has it at \
                      {time}",
-                    self.scans.file.display(),
+                    self.scans.name(),
                     tick.time,
                     tick.number
                 );

@@ -12,7 +12,7 @@ use tickbus_image::signal::{Area, DataType, Scale, Signal, SignalTable, Slot, St
 use tickbus_test_log as logged;
 
 /// A signal of each type, in both areas, with names that are difficult for VCD and CSV.
-fn table(stations: &[&str]) -> SignalTable {
+pub(crate) fn table(stations: &[&str]) -> SignalTable {
     let mut signals = Vec::new();
     for (station, _) in stations.iter().enumerate() {
         for (number, data_type) in DataType::ALL.into_iter().enumerate() {
@@ -44,7 +44,7 @@ fn table(stations: &[&str]) -> SignalTable {
     }
 }
 
-fn columns(table: &SignalTable) -> Columns {
+pub(crate) fn columns(table: &SignalTable) -> Columns {
     let count = table.signals.len();
     let edges: Vec<_> = (0..count)
         .map(|signal| (table.signals[signal].data_type == DataType::Bool).then_some(count))
@@ -53,7 +53,7 @@ fn columns(table: &SignalTable) -> Columns {
 }
 
 /// The file that a sink writes for these ticks, and the offset in it at which each tick ends.
-fn written(format: Format, columns: &Columns, ticks: &[Tick]) -> (Vec<u8>, Vec<usize>) {
+pub(crate) fn written(format: Format, columns: &Columns, ticks: &[Tick]) -> (Vec<u8>, Vec<usize>) {
     let (mut sink, mut out, mut ends) = (format.sink(columns.clone()), Vec::new(), Vec::new());
     sink.header(&mut out);
     let header = out.len();
@@ -69,13 +69,17 @@ fn written(format: Format, columns: &Columns, ticks: &[Tick]) -> (Vec<u8>, Vec<u
     (out, ends)
 }
 
-fn open(format: Format, bytes: &[u8], table: &SignalTable) -> Result<Recording, RecordingError> {
+pub(crate) fn open(
+    format: Format,
+    bytes: &[u8],
+    table: &SignalTable,
+) -> Result<Recording, RecordingError> {
     let bytes = Box::new(Cursor::new(bytes.to_vec()));
     Recording::read("run", format, bytes, Some(table))
 }
 
 /// All ticks, and the result of the last read.
-fn read(mut recording: Recording) -> (Vec<Tick>, Result<bool, RecordingError>) {
+pub(crate) fn read(mut recording: Recording) -> (Vec<Tick>, Result<bool, RecordingError>) {
     let mut tick = Tick::new(recording.columns());
     let mut ticks = Vec::new();
     loop {
@@ -98,7 +102,7 @@ fn value(kind: ValueKind, word: u64) -> Slot {
 }
 
 /// Ticks made from random words; few values change between two of them.
-fn ticks(columns: &Columns, words: &[(u64, u64)]) -> Vec<Tick> {
+pub(crate) fn ticks(columns: &Columns, words: &[(u64, u64)]) -> Vec<Tick> {
     let mut tick = Tick::new(columns);
     let mut ticks = Vec::new();
     for (index, &(at, word)) in words.iter().enumerate() {

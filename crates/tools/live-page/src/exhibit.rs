@@ -1,6 +1,7 @@
 //! The exhibits of the page: a driver with its line, or a run on virtual time.
 
 use std::fmt;
+use std::sync::Arc;
 
 use tickbus_base::statistics::Statistics;
 use tickbus_base::time::Nanos;
@@ -9,6 +10,7 @@ use tickbus_fieldbus::LinkState;
 use tickbus_image::signal::Signal;
 use tickbus_web::Refused;
 
+use crate::archive::Archive;
 use crate::picture::Picture;
 use crate::sheet::Sheet;
 
@@ -66,6 +68,11 @@ pub(crate) trait Exhibit: fmt::Debug + Send {
 
     /// The counters and measurements.
     fn statistics(&self) -> &Statistics;
+
+    /// The past, if it is recorded.
+    fn archive(&self) -> Option<Arc<Archive>> {
+        None
+    }
 
     /// The picture of the machine.
     fn picture(&self) -> Option<&Picture> {

@@ -10,7 +10,7 @@ use crate::metrics;
 use crate::model::{Model, Shared};
 use crate::order::{Order, order};
 
-/// How often it looks while there is no viewer: for the trends.
+/// How often it looks while there is no viewer: for faults and states of the line.
 const IDLE: Nanos = Nanos::from_millis(500);
 
 /// The shortest time between two copies of a tick: 60 in a second.
@@ -196,8 +196,7 @@ impl Keeper {
         match wish {
             Wish::Look(answer) => answer.give(State::Differences(Arc::clone(&self.model) as _)),
             Wish::Get(path, answer) => {
-                let now = self.clock.now();
-                answer.give(self.model.with(|model| document(model, &path, now)));
+                answer.give(self.model.with(|model| document(model, &path)));
             }
             Wish::Change(change, answer) => {
                 let done = order(&change).and_then(|order| self.obey(&order));
@@ -229,41 +228,28 @@ fn take(driver: &mut dyn Exhibit) {
 }
 
 /// The document at a path.
-fn document(model: &Model, path: &str, now: Nanos) -> Option<Document> {
+fn document(model: &Model, path: &str) -> Option<Document> {
     let (kind, text) = match path {
         "/signals" => (JSON, model.signals()),
         "/line" => (JSON, model.line()),
         "/metrics" => (METRICS, metrics::text(model)),
-        _ => of_driver(model, path, now)?,
+        _ => of_driver(model, path)?,
     };
     Some(Document { kind, text })
 }
 
-fn of_driver(model: &Model, path: &str, now: Nanos) -> Option<(&'static str, String)> {
-    if let Some(file) = path.strip_prefix(PICTURE) {
-        let (id, ending) = file.split_once('.')?;
-        let picture = model.driver(id.parse().ok()?)?.picture()?;
-        return match ending {
-            "svg" => Some((SVG, picture.svg.clone())),
-            "json" => {
-                let (left_out, mistakes) = (&picture.left_out, &picture.mistakes);
-                let json = serde_json::json!({ "left_out": left_out, "mistakes": mistakes });
-                Some((JSON, json.to_string()))
-            }
-            _ => None,
-        };
+fn of_driver(model: &Model, path: &str) -> Option<(&'static str, String)> {
+    let (id, ending) = path.strip_prefix(PICTURE)?.split_once('.')?;
+    let picture = model.driver(id.parse().ok()?)?.picture()?;
+    match ending {
+        "svg" => Some((SVG, picture.svg.clone())),
+        "json" => {
+            let (left_out, mistakes) = (&picture.left_out, &picture.mistakes);
+            let json = serde_json::json!({ "left_out": left_out, "mistakes": mistakes });
+            Some((JSON, json.to_string()))
+        }
+        _ => None,
     }
-    let (id, index) = path.strip_prefix("/trend/")?.split_once('/')?;
-    let driver = model.driver(id.parse().ok()?)?;
-    let index = index.parse().ok()?;
-    driver.signals().get(index)?;
-    let points = driver.sheet().trend.of(index, now);
-    let millis: Vec<i64> = points.iter().map(|(at, _)| at.0 / 1_000_000).collect();
-    let values: Vec<f64> = points.iter().map(|(_, value)| *value).collect();
-    // The minimum: with an open page, looks are far more frequent.
-    let looks = 1_000_000_000 / IDLE.0;
-    let json = serde_json::json!({ "ms": millis, "values": values, "samples_per_s": looks });
-    Some((JSON, json.to_string()))
 }
 
 #[cfg(test)]
@@ -353,7 +339,7 @@ mod tests {
         let clock: Arc<dyn Clock> = Monotonic::shared();
         let (is_let, taken) = (Arc::default(), Arc::<AtomicUsize>::default());
         let fake = Fake {
-            sheet: Sheet::new(clock.now(), &[]),
+            sheet: Sheet::new(&[]),
             statistics: Statistics::default(),
             is_let: Arc::clone(&is_let),
             looks: 0,

@@ -2,11 +2,14 @@
 //!
 //! Drivers and PLC programs join a [`LivePage`], each as a [`Watch`](tickbus_driver::Watch). While somebody looks, the
 //! page's thread requests copies of the ticks, and compares them with the known state: a viewer gets only the changes
-//! since the last look. Signals are forced by faults of the kind "stuck". The server of a run on virtual time joins by
+//! since the last look. Another thread answers requests about the past, from the history that the driver's recorder
+//! feeds. Signals are forced by faults of the kind "stuck". The server of a run on virtual time joins by
 //! its [`Controls`](tickbus_virtual_time::Controls), and is only shown. docs/live-page.md describes the page, for users
 //! and for programs.
 
+mod archive;
 mod assets;
+mod codec;
 mod exhibit;
 mod keeper;
 mod line;
@@ -15,11 +18,11 @@ mod model;
 mod options;
 mod order;
 mod page;
+mod past;
 pub mod picture;
 mod run;
 mod sheet;
 mod shown;
-mod trend;
 mod value;
 
 pub use options::Options;

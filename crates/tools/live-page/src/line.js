@@ -143,7 +143,7 @@ const line = (() => {
   const isSilent = (line) => line.silence_ms > 1000;
 
   /** Milliseconds since the line was last heard of, for figures that count on between messages. */
-  const since = (line) => line.since_ms + (performance.now() - line.heard);
+  const since = (line) => line.since_ms + (line.isPast ? 0 : performance.now() - line.heard);
 
   function show() {
     if (cards.size !== plant.drivers.length || plant.drivers.some(({ id }) => !cards.has(id))) {
@@ -151,7 +151,7 @@ const line = (() => {
       cards = new Map(plant.drivers.map((driver) => [driver.id, card(driver)]));
     }
     for (const driver of plant.drivers) {
-      const { line } = driver;
+      const line = plant.lineOf(driver);
       const own = cards.get(driver.id);
       if (!line) continue;
       // A line can run with stale data while the PLC is in STOP.
@@ -162,7 +162,7 @@ const line = (() => {
       own.state.className = `tag ${colour[state] ?? ""}`;
       own.it.classList.toggle("trouble", state !== "running");
       say(own.reason, line.reason || "no reason known");
-      say(own.since, `for ${words.span(since(line))}, cause ${line.cause}, data ${line.status}${isSilent(line) ? `; the simulation has not ticked for ${words.span(line.silence_ms)}` : ""}`);
+      say(own.since, `${line.since_ms === undefined ? "" : `for ${words.span(since(line))}, `}cause ${line.cause}, data ${line.status}${isSilent(line) ? `; the simulation has not ticked for ${words.span(line.silence_ms)}` : ""}`);
       // A forced value that was released is no longer worth a row.
       faults(own, (line.faults ?? []).filter(({ name, phase }) => phase !== "over" || !name.startsWith("forced: ")));
       showModelFaults(own, line.model_faults ?? []);

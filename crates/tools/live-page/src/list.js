@@ -188,7 +188,7 @@ const list = (() => {
 
   const paint = {
     station(element, { driver, station }) {
-      const line = driver.line?.stations?.[station];
+      const line = plant.lineOf(driver)?.stations?.[station];
       const name = driver.stations[station];
       text(element, "name", plant.drivers.length > 1 ? (driver.stations.length > 1 ? `${driver.name} · ${name}` : driver.name) : name);
       const age = typeof line?.age_ms === "number" ? `, ${words.span(line.age_ms)} old` : "";
@@ -240,7 +240,7 @@ const list = (() => {
     const [top, bottom] = seen();
     const head = narrow.matches ? 0 : document.getElementById("head").offsetHeight;
     const scroller = frame.scrollHeight > frame.clientHeight + 1 && getComputedStyle(frame).overflowY !== "visible" ? frame : document.scrollingElement;
-    const space = scroller === frame ? 0 : document.getElementById("tray").offsetHeight;
+    const space = scroller === frame ? 0 : document.getElementById("foot").offsetHeight;
     if (tops[row] < top + head) scroller.scrollTop -= top + head - tops[row];
     else if (tops[row + 1] > bottom - space) scroller.scrollTop += tops[row + 1] - bottom + space;
   }

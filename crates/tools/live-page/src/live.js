@@ -32,15 +32,22 @@
     return answer?.ok === true;
   }
 
+  /** True, with the reason, while the page shows the past: a force would act on another moment than the one seen. */
+  function isPast() {
+    if (!bar.moment) return false;
+    say("You look at the past, and a force acts on the present: press Live first.", true);
+    return true;
+  }
+
   function force(signal, text) {
-    if (!signal) return;
+    if (!signal || isPast()) return;
     const value = text.trim().replace(",", ".").replace("−", "-");
     change("PUT", pathOf(signal), value, `${signal.name} is forced to ${value}${signal.unit ? ` ${signal.unit}` : ""}.`);
   }
 
   function release(signal) {
     if (!signal || !mayForce) return;
-    change("DELETE", pathOf(signal), undefined, `${signal.name} is released.`);
+    change("DELETE", pathOf(signal), undefined, `${signal.name} is released${bar.moment ? " now; the page shows the past" : ""}.`);
   }
 
   /** Opens the tools that force the chosen signal. */
@@ -51,6 +58,8 @@
       say("Read-only: open the address that was printed, with its token, to force a signal.", true);
     } else if (!signal.isWritable) {
       say(`${signal.name} cannot be forced.`, true);
+    } else if (isPast()) {
+      // Nothing to type.
     } else if (signal.isBool) {
       get(plant.number(signal) > 0.5 ? "force-false" : "force-true").focus();
     } else {
@@ -81,12 +90,26 @@
       forceValue.value = signal.value === null || signal.isBool ? "" : String(signal.value);
       if (!/^Read-only/.test(get("status").textContent)) say("");
     }
-    const isLost = !signal.isForced && document.activeElement === get("release");
-    get("release").disabled = !signal.isForced;
+    const isForced = plant.isForcedNow(signal);
+    const isLost = !isForced && document.activeElement === get("release");
+    get("release").disabled = !isForced;
     if (isLost) get("list").focus({ preventScroll: true });
   }
 
-  line.begin(change);
+  line.begin((...order) => {
+    if (order[0] === "DELETE" || !isPast()) change(...order);
+  });
+  bar.begin({
+    say,
+    chosen: () => list.chosen,
+    shown() {
+      line.show();
+      if (list.kind === "forced" || list.kind === "failsafe") list.choose();
+      trend.collect();
+      setLink();
+      redraw();
+    },
+  });
   list.begin({
     chosen: showChosen,
     force: edit,
@@ -113,7 +136,7 @@
 
   window.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
-    const isTyping = event.target.matches?.("input");
+    const isTyping = event.target.matches?.("input:not([type=range]), select");
     const isTray = get("tray").contains(event.target);
     if (event.key === "Escape" && isTray) {
       get("list").focus({ preventScroll: true });
@@ -123,6 +146,8 @@
       get("list").focus({ preventScroll: true });
     } else if (isTyping) {
       return;
+    } else if (bar.key(event)) {
+      // The bar of time has used it.
     } else if (event.key === "/") {
       get("filter").focus();
       get("filter").select();
@@ -165,10 +190,11 @@
     const now = { forced: 0, failSafe: 0 };
     const names = [];
     for (const signal of plant.signals) {
-      if (signal.isForced) {
+      if (plant.isForcedNow(signal)) {
         now.forced += 1;
-        if (names.length < 3) names.push(`${signal.name} to ${words.value(signal)}${signal.unit ? ` ${signal.unit}` : ""}`);
-      } else if (signal.isFailSafe) {
+        const [value] = signal.live;
+        if (names.length < 3) names.push(`${signal.name} to ${words.value({ ...signal, value })}${signal.unit ? ` ${signal.unit}` : ""}`);
+      } else if (plant.isFailSafeNow(signal)) {
         now.failSafe += 1;
       }
     }
@@ -208,10 +234,18 @@
       isDue = false;
       alarm();
       list.redraw();
+      bar.redraw();
       if (list.chosen) showChosen(list.chosen);
       const moves = !isOld && pictures.move();
-      if (!isOld && (moves || list.isMoving())) redraw();
+      // The bar counts on in the past.
+      if (!isOld && (moves || list.isMoving() || bar.moment)) redraw();
     });
+  }
+
+  /** Shows whether the page is live. */
+  function setLink() {
+    show(get("link"), isOld ? "no connection" : bar.moment ? "paused" : "live");
+    get("link").className = isOld ? "tag bad" : bar.moment ? "tag stale" : "tag good";
   }
 
   room.listen({
@@ -235,8 +269,7 @@
     age(isNowOld, seconds) {
       isOld = isNowOld;
       document.body.classList.toggle("is-old", isOld);
-      show(get("link"), isOld ? "no connection" : "live");
-      get("link").className = isOld ? "tag bad" : "tag good";
+      setLink();
       get("age").hidden = !isOld;
       if (isOld) show(get("age"), plant.signals.length ? `No connection to the simulation. What is shown is ${seconds} s old.` : "No connection to the simulation.");
       else redraw();

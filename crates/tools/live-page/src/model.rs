@@ -123,14 +123,28 @@ impl Model {
         format!("{{\"drivers\":[{}]}}", drivers.join(","))
     }
 
+    /// How far the histories reach: the first and the last time in milliseconds, the last tick, and whether older ticks
+    /// were dropped.
+    fn write_past(&self, json: &mut String) {
+        let drivers = self.drivers();
+        let reaches = drivers.filter_map(|driver| {
+            let reach = driver.archive()?.reach()?;
+            Some(format!("\"{}\":{reach}", driver.id()))
+        });
+        let reaches: Vec<String> = reaches.collect();
+        // Writing to a String cannot fail.
+        let _ = write!(json, ",\"past\":{{{}}}", reaches.join(","));
+    }
+
     fn since(&self, seen: Option<u64>) -> String {
         let (layout, time) = (self.layout, self.now.0 / 1_000_000);
         let seen = seen.filter(|seen| *seen >= self.layout_number);
         let Some(seen) = seen else {
             let (signals, line) = (self.signals(), self.line());
-            return format!(
-                "{{\"layout\":{layout},\"full\":true,\"time_ms\":{time},\"signals\":{signals},\"line\":{line}}}"
-            );
+            let mut json = format!("{{\"layout\":{layout},\"full\":true,\"time_ms\":{time}");
+            self.write_past(&mut json);
+            let _ = write!(json, ",\"signals\":{signals},\"line\":{line}}}");
+            return json;
         };
         let mut json = format!("{{\"layout\":{layout},\"time_ms\":{time},\"values\":{{");
         let mut comma = "";
@@ -142,6 +156,7 @@ impl Model {
             }
         }
         json.push('}');
+        self.write_past(&mut json);
         if self
             .drivers()
             .any(|driver| driver.sheet().has_new_line(seen))

@@ -15,6 +15,7 @@ use crate::exhibit::Exhibit;
 use crate::keeper::{Inbox, Keeper, Wish};
 use crate::model::Shared;
 use crate::options::Options;
+use crate::past::{Door, Past};
 use crate::run::ShownRun;
 use crate::shown::Shown;
 
@@ -24,6 +25,8 @@ pub struct LivePage {
     model: Arc<Shared>,
     clock: Arc<dyn Clock>,
     thread: Option<JoinHandle<()>>,
+    door: Door,
+    _past: Past,
 }
 
 impl fmt::Debug for LivePage {
@@ -47,6 +50,7 @@ impl LivePage {
     /// The system could not start a thread.
     pub fn open(clock: Arc<dyn Clock>) -> io::Result<Self> {
         let (inbox, model) = (Arc::<Inbox>::default(), Arc::<Shared>::default());
+        let (past, door) = Past::open(Arc::clone(&model))?;
         let keeper = Keeper {
             inbox: Arc::clone(&inbox),
             model: Arc::clone(&model),
@@ -61,12 +65,14 @@ impl LivePage {
             model,
             clock,
             thread: Some(thread),
+            door,
+            _past: past,
         })
     }
 
     /// The site that the room serves.
     pub fn site(&self) -> Arc<dyn Site> {
-        Arc::new(LiveSite(Arc::clone(&self.inbox)))
+        Arc::new(LiveSite(Arc::clone(&self.inbox), self.door.clone()))
     }
 
     /// Shows a driver, or a PLC program, until the returned value is dropped.
@@ -117,7 +123,7 @@ impl Drop for Member {
 }
 
 /// The page, as the room serves it.
-struct LiveSite(Arc<Inbox>);
+struct LiveSite(Arc<Inbox>, Door);
 
 impl Site for LiveSite {
     fn assets(&self) -> &[Asset] {
@@ -136,7 +142,11 @@ impl Site for LiveSite {
                 text: "[]".to_owned(),
             }));
         }
-        self.0.put(Wish::Get(path.to_owned(), answer));
+        if Door::leads_to(path) {
+            self.1.ask(path, answer);
+        } else {
+            self.0.put(Wish::Get(path.to_owned(), answer));
+        }
     }
 
     fn change(&self, change: Change, answer: Answer<Outcome>) {

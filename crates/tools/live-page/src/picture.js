@@ -151,7 +151,7 @@ const pictures = (() => {
 
   /** The current value of a moving property: it reaches a new target at constant speed within the drawing's time. */
   function eased(mover, what, target, now) {
-    if (!mover.smooth || !Number.isFinite(target)) return target;
+    if (!mover.smooth || !Number.isFinite(target) || plant.isPast) return target;
     const way = mover.moving[what] ??= { from: target, to: target, begin: now - mover.smooth };
     const at = () => way.from + (way.to - way.from) * Math.min(1, (now - way.begin) / mover.smooth);
     if (way.to !== target) Object.assign(way, { from: at(), to: target, begin: now });
@@ -164,7 +164,8 @@ const pictures = (() => {
   /** Updates the pictures from the signals. Returns whether something still moves. */
   function move() {
     const now = performance.now();
-    const passed = Math.min(LONGEST, now - last);
+    // What spins stands still in a moment of the past, and what moves slowly is where it is.
+    const passed = plant.isPast ? 0 : Math.min(LONGEST, now - last);
     last = now;
     isBusy = false;
     for (const { driver, movers, root, element, notice } of all) {
@@ -206,7 +207,7 @@ const pictures = (() => {
         case "spin":
           mover.spun = (mover.spun + (out ?? 0) * passed / 1000) % 360;
           place.turn += mover.spun;
-          if (out) isBusy = true;
+          if (out && !plant.isPast) isBusy = true;
           isPlaced = true;
           break;
         default: {
@@ -237,7 +238,8 @@ const pictures = (() => {
     return `matrix(${[to.a, to.b, to.c, to.d, to.e, to.f].map((it) => Number(it.toFixed(4))).join(" ")})`;
   }
 
-  function ofBus({ line }, name) {
+  function ofBus(driver, name) {
+    const line = plant.lineOf(driver);
     if (!line) return NaN;
     if (name === "bus.age") return Math.max(...line.stations.map(({ age_ms: age }) => age ?? NaN));
     if (name !== "bus.status") return NaN;

@@ -5,16 +5,21 @@ use std::sync::Arc;
 use tickbus_base::statistics::Statistics;
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::{Cause, LinkState};
-use tickbus_image::signal::{Area, Signal, Slot};
+use tickbus_image::signal::{Area, Signal, SignalTable, Slot};
+use tickbus_record::{Column, Columns, History, Tick, ValueKind};
 use tickbus_virtual_time::{Controls, Members, Pacing, RunView, State, Step, slot_of};
 use tickbus_web::Refused;
 
+use crate::archive::{Archive, Facts};
 use crate::exhibit::{Exhibit, Freshness};
 use crate::line::{self, Line, Station};
 use crate::sheet::{DriverJson, Row, STALE, Sheet, SignalJson, UNKNOWN};
 
 /// A step is shown as late if it takes longer than this, and longer than a tenth of its limit.
 const LATE: Nanos = Nanos::from_secs(1);
+
+/// The memory for the steps that were seen, in bytes.
+const HISTORY: usize = 64 << 20;
 
 /// The shortest interval for measuring the speed of a run.
 const SHORTEST: Nanos = Nanos::from_millis(250);
@@ -36,6 +41,10 @@ pub(crate) struct ShownRun {
     /// The variables as signals; the stations are the clients.
     signals: Vec<Signal>,
     sheet: Sheet,
+    /// The steps that the page has seen.
+    archive: Option<Arc<Archive>>,
+    /// The number of the last one.
+    seen: u64,
     state: Told,
     since: Nanos,
     pace: Pace,
@@ -96,7 +105,9 @@ impl ShownRun {
             }),
             is_other: false,
             signals: Vec::new(),
-            sheet: Sheet::new(now, &[]),
+            sheet: Sheet::new(&[]),
+            archive: None,
+            seen: 0,
             state: told(None),
             since: now,
             pace: Pace {
@@ -112,7 +123,7 @@ impl ShownRun {
     }
 
     /// Restarts if the participants have changed.
-    fn take_members(&mut self, now: Nanos) {
+    fn take_members(&mut self) {
         self.is_other = false;
         let Some(view) = &self.view else {
             return;
@@ -139,7 +150,66 @@ impl ShownRun {
         let values: Vec<Slot> = values
             .map(|(signal, value)| slot_of(signal.data_type, *value))
             .collect();
-        self.sheet = Sheet::new(now, &values);
+        self.sheet = Sheet::new(&values);
+        (self.archive, self.seen) = (Some(Arc::new(self.new_archive())), 0);
+    }
+
+    /// An empty archive of the present variables.
+    fn new_archive(&self) -> Archive {
+        let columns = self.signals.iter().map(|signal| Column {
+            name: signal.name.clone(),
+            is_edges: false,
+            kind: ValueKind::of(signal.data_type, false),
+            address: None,
+            data_type: Some(signal.data_type),
+            unit: None,
+            station: match self.members.clients.get(signal.station) {
+                Some(client) => client.name.clone(),
+                None => String::new(),
+            },
+        });
+        let columns = Columns {
+            driver: self.name.clone(),
+            role: "sync".to_owned(),
+            stations: Vec::new(),
+            columns: columns.collect(),
+        };
+        let facts = Facts {
+            table: SignalTable {
+                signals: self.signals.clone(),
+                ..SignalTable::default()
+            },
+            reads: None,
+            is_fail_safe: false,
+            is_sampled: true,
+            has_bits: false,
+        };
+        Archive::new(Arc::new(History::new(columns, HISTORY)), facts)
+    }
+
+    /// Adds the step that the page has seen to the archive.
+    fn remember(&mut self) {
+        let (Some(view), Some(archive)) = (&self.view, &self.archive) else {
+            return;
+        };
+        let Some(step) = view.step.filter(|_| has_begun(view)) else {
+            return;
+        };
+        if step.sequence < self.seen {
+            return;
+        }
+        self.seen = step.sequence + 1;
+        let values = self.signals.iter().zip(&view.values);
+        let values = values.map(|(signal, value)| {
+            let kind = ValueKind::of(signal.data_type, false);
+            kind.kept(slot_of(signal.data_type, *value))
+        });
+        archive.history.push(&Tick {
+            number: step.sequence + 1,
+            time: step.time,
+            values: values.collect(),
+            ..Tick::default()
+        });
     }
 
     fn take_values(&mut self, now: Nanos, number: u64) -> bool {
@@ -390,11 +460,11 @@ impl Exhibit for ShownRun {
     }
 
     fn update(&mut self, now: Nanos, number: u64, with_line: bool) -> bool {
-        self.take_members(now);
+        self.take_members();
         let step = self.view.as_ref().and_then(|view| view.step);
         self.pace.go_on(now, step);
         let is_new = self.take_values(now, number);
-        self.sheet.go_on(now, number, &self.signals);
+        self.remember();
         self.update_line(now, number, with_line) || is_new
     }
 
@@ -450,6 +520,10 @@ impl Exhibit for ShownRun {
             }
         });
         freshness.collect()
+    }
+
+    fn archive(&self) -> Option<Arc<Archive>> {
+        self.archive.clone()
     }
 
     fn state(&self) -> LinkState {

@@ -1,11 +1,11 @@
 //! The page's knowledge of the signals of one driver or run, and the updates for viewers.
 
-use serde::Serialize;
+use serde::ser::SerializeSeq as _;
+use serde::{Serialize, Serializer};
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::{Signal, Slot};
 
-use crate::trend::Trend;
-use crate::value::{Number, raw};
+use crate::value::{Number, raw, raw_follows};
 
 /// The other end gets the fail-safe value, or this end does.
 pub(crate) const FAIL_SAFE: u8 = 1;
@@ -60,13 +60,24 @@ impl Row {
             f64::NAN
         }
     }
+
+    /// The row of the signal with this index, for viewers.
+    pub(crate) fn json(&self, index: usize, signal: &Signal) -> ChangeJson {
+        let follows = self.flags & UNKNOWN == 0 && raw_follows(signal, self.slot, self.bits);
+        ChangeJson {
+            index,
+            value: self.value(signal),
+            raw: (!follows).then(|| self.raw(signal)),
+            edges: signal.latch.map(|_| self.edges),
+            flags: self.flags,
+        }
+    }
 }
 
 /// All signals as last seen, and the line as JSON.
 #[derive(Debug)]
 pub(crate) struct Sheet {
     pub(crate) rows: Vec<Row>,
-    pub(crate) trend: Trend,
     /// The time of the request for the copy that has not come.
     asked: Option<Nanos>,
     /// The previous copy had not come when this one was requested.
@@ -79,12 +90,40 @@ pub(crate) struct Sheet {
     line_number: u64,
 }
 
-/// A signal whose value has changed: index, value, raw, edges, flags.
-type ChangeJson = (usize, Number, String, Option<u32>, u8);
+/// A signal whose value has changed, as a list: index, value, raw, edges, flags. The raw value is `null` if it
+/// follows from the value, and the end of the list is left out where it is `null` and 0.
+#[derive(Debug)]
+pub(crate) struct ChangeJson {
+    index: usize,
+    value: Number,
+    pub(crate) raw: Option<String>,
+    edges: Option<u32>,
+    flags: u8,
+}
+
+impl Serialize for ChangeJson {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut list = serializer.serialize_seq(None)?;
+        list.serialize_element(&self.index)?;
+        list.serialize_element(&self.value)?;
+        let has_flags = self.flags != 0;
+        let has_edges = has_flags || self.edges.is_some();
+        if has_edges || self.raw.is_some() {
+            list.serialize_element(&self.raw)?;
+        }
+        if has_edges {
+            list.serialize_element(&self.edges)?;
+        }
+        if has_flags {
+            list.serialize_element(&self.flags)?;
+        }
+        list.end()
+    }
+}
 
 impl Sheet {
     /// A sheet of signals with these values, which have not been looked at yet.
-    pub(crate) fn new(now: Nanos, values: &[Slot]) -> Self {
+    pub(crate) fn new(values: &[Slot]) -> Self {
         let row = |slot: &Slot| Row {
             slot: *slot,
             bits: 0,
@@ -94,7 +133,6 @@ impl Sheet {
         };
         Self {
             rows: values.iter().map(row).collect(),
-            trend: Trend::new(now, values.len()),
             asked: None,
             is_slow: false,
             known: NEVER,
@@ -151,30 +189,12 @@ impl Sheet {
         !is_same
     }
 
-    /// Adds the new values of the state with this number to the trends.
-    pub(crate) fn go_on(&mut self, now: Nanos, number: u64, signals: &[Signal]) {
-        for (index, (signal, row)) in signals.iter().zip(&self.rows).enumerate() {
-            if row.number == number {
-                self.trend.add(index, row.live(signal), None);
-            }
-        }
-        self.trend.go_on(now);
-    }
-
     /// The signals that are new since the state with this number, as JSON; `None` without any.
     pub(crate) fn changes(&self, signals: &[Signal], since: u64) -> Option<String> {
         let rows = signals.iter().zip(&self.rows).enumerate();
         let rows = rows.filter(|(_, (_, row))| row.number > since);
         let changes: Vec<ChangeJson> = rows
-            .map(|(index, (signal, row))| {
-                (
-                    index,
-                    row.value(signal),
-                    row.raw(signal),
-                    signal.latch.map(|_| row.edges),
-                    row.flags,
-                )
-            })
+            .map(|(index, (signal, row))| row.json(index, signal))
             .collect();
         (!changes.is_empty()).then(|| serde_json::to_string(&changes).expect("texts and numbers"))
     }

@@ -1,6 +1,7 @@
 //! One driver on the page: its signals as last seen, the forces, the line.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use tickbus_base::Mistake;
 use tickbus_base::statistics::Statistics;
@@ -8,9 +9,11 @@ use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{did_you_mean, shown};
 use tickbus_driver::Watch;
 use tickbus_fieldbus::{Link, LinkState, Role};
-use tickbus_image::signal::{Area, Latch, Plan, RawValues, Signal, Slot};
+use tickbus_image::signal::{Area, Latch, Signal, Slot};
 use tickbus_web::Refused;
 
+use crate::archive::{Archive, Facts};
+use crate::codec::Codec;
 use crate::exhibit::{Exhibit, Freshness};
 use crate::line::{self, age_now, millis};
 use crate::options::Options;
@@ -26,6 +29,7 @@ pub(crate) struct Shown {
     watch: Watch,
     options: Options,
     sheet: Sheet,
+    archive: Option<Arc<Archive>>,
     codec: Codec,
     /// By the index of the signal.
     forced: BTreeMap<usize, Force>,
@@ -47,54 +51,25 @@ struct Force {
     value: Slot,
 }
 
-/// The bits of all values, of both areas.
-#[derive(Debug)]
-struct Codec {
-    areas: [(Vec<Plan>, RawValues); 2],
-    frame: Vec<u8>,
-}
-
-impl Codec {
-    fn new(watch: &Watch) -> Self {
-        let table = &watch.config().table;
-        let areas = [Area::Input, Area::Output].map(|area| {
-            let stations = 0..table.stations.len();
-            let plans = stations.map(|station| Plan::new(table, station, area));
-            (plans.collect(), RawValues::new(table, area))
-        });
-        let sizes = table.stations.iter();
-        let sizes = sizes.map(|station| station.input_bytes.max(station.output_bytes));
-        Self {
-            areas,
-            frame: vec![0; sizes.max().unwrap_or(0)],
-        }
-    }
-
-    fn take(&mut self, watch: &Watch, slots: &[Slot]) {
-        let stations = watch.config().table.stations.iter().enumerate();
-        for (index, station) in stations {
-            for ((plans, values), area) in self.areas.iter_mut().zip([Area::Input, Area::Output]) {
-                let frame = &mut self.frame[..station.bytes(area)];
-                frame.fill(0);
-                plans[index].encode(slots, frame);
-                values.take(index, frame);
-            }
-        }
-    }
-
-    fn bits(&self, signal: &Signal, index: usize) -> u64 {
-        let (_, values) = &self.areas[usize::from(signal.area == Area::Output)];
-        values.bits(index)
-    }
-}
-
 impl Shown {
     pub(crate) fn new(id: i32, watch: Watch, options: Options, now: Nanos) -> Self {
+        let config = watch.config();
+        let archive = watch.history().map(|history| {
+            let facts = Facts {
+                table: config.table.clone(),
+                reads: Some(watch.role().areas().1),
+                is_fail_safe: watch.is_driver(),
+                is_sampled: false,
+                has_bits: true,
+            };
+            Arc::new(Archive::new(Arc::clone(history), facts))
+        });
         let values: Vec<Slot> = watch.view(|view| view.slots.to_vec());
         let mut driver = Self {
             id,
-            sheet: Sheet::new(now, &values),
-            codec: Codec::new(&watch),
+            sheet: Sheet::new(&values),
+            archive,
+            codec: Codec::new(&config.table),
             forced: BTreeMap::new(),
             faults: BTreeMap::new(),
             ending: Vec::new(),
@@ -139,7 +114,7 @@ impl Shown {
                 }
             }
         }
-        codec.take(watch, &values);
+        codec.take(table, &values);
         watch.view(|view| {
             let count = |station| line::is_stale_now(station, silence, config.timing.max_age);
             let now: Vec<bool> = view.stations.iter().map(count).collect();
@@ -169,13 +144,6 @@ impl Shown {
                     flags,
                     number,
                 };
-                // A pulse that ended before it was seen.
-                let row = &sheet.rows[index];
-                let edges = seen.edges.wrapping_sub(row.edges);
-                if edges > 0 && (edges > 1 || seen.slot == row.slot) && row.flags & UNKNOWN == 0 {
-                    let value = seen.live(signal);
-                    sheet.trend.add(index, value, Some([0.0, 1.0]));
-                }
                 is_new |= sheet.put(index, seen);
             }
         });
@@ -184,6 +152,10 @@ impl Shown {
 
     fn update_line(&mut self, now: Nanos, number: u64, with_line: bool) -> bool {
         let link = self.watch.link();
+        if let Some(archive) = &self.archive {
+            archive.note_line(&link, self.watch.clock().now());
+            archive.note_faults(&self.watch.faults());
+        }
         let is_other = (link.state, link.cause) != (self.link.state, self.link.cause)
             || (link.state == LinkState::Opening && link.reason != self.link.reason)
             || std::mem::take(&mut self.is_turn);
@@ -285,8 +257,6 @@ impl Exhibit for Shown {
 
     fn update(&mut self, now: Nanos, number: u64, with_line: bool) -> bool {
         let is_new = self.take_values(number);
-        let signals = &self.watch.config().table.signals;
-        self.sheet.go_on(now, number, signals);
         self.update_line(now, number, with_line) || is_new
     }
 
@@ -327,6 +297,10 @@ impl Exhibit for Shown {
 
     fn statistics(&self) -> &Statistics {
         &self.statistics
+    }
+
+    fn archive(&self) -> Option<Arc<Archive>> {
+        self.archive.clone()
     }
 
     fn picture(&self) -> Option<&Picture> {

@@ -8,11 +8,13 @@ const run = { begin: 0, end: 0, unit: 1e6 };
 const plant = (() => {
   /** How long a changed value is shown as new, in milliseconds. */
   const NEW = 350;
-  /** A connection that returns within this time has missed nothing visible in a trend, in milliseconds. */
-  const MISSED = 250;
+  /** The longest time for which a driver's clock is assumed to go on between two events, in milliseconds. */
+  const ASSUMED = 1000;
   const FAIL_SAFE = 1;
   const FORCED = 2;
   const STALE = 4;
+  /** True while the signals show a moment of the past. */
+  let isPast = false;
   let layout = null;
   let drivers = [];
   let signals = [];
@@ -39,11 +41,33 @@ const plant = (() => {
       isOpen: false,
       trend: null,
     };
-    take(signal, given.value, given.raw, given.edges, (given.failsafe ? FAIL_SAFE : 0) | (given.forced === null ? 0 : FORCED) | (given.stale ? STALE : 0));
+    show(signal, ...live(signal, given.value, given.raw, given.edges, (given.failsafe ? FAIL_SAFE : 0) | (given.forced === null ? 0 : FORCED) | (given.stale ? STALE : 0)));
     return signal;
   }
 
-  function take(signal, value, raw, edges, flags) {
+  /** The bytes of the types whose raw value can follow from the value. */
+  const SIZES = { BYTE: 1, SINT: 1, USINT: 1, WORD: 2, INT: 2, UINT: 2, DWORD: 4, DINT: 4, UDINT: 4, REAL: 4, LREAL: 8 };
+  const bits = new DataView(new ArrayBuffer(8));
+
+  /** The raw value of a signal without a scale, as the server writes it: `16#6C00`. */
+  function rawOf(type, value) {
+    const size = SIZES[type];
+    if (!size || typeof value !== "number") return "";
+    if (type === "REAL") bits.setFloat32(0, value);
+    else if (type === "LREAL") bits.setFloat64(0, value);
+    else bits.setBigUint64(0, BigInt.asUintN(64, BigInt(value)) << BigInt(64 - 8 * size));
+    let text = "16#";
+    for (let i = 0; i < size; i++) text += bits.getUint8(i).toString(16).toUpperCase().padStart(2, "0");
+    return text;
+  }
+
+  /** Stores the value of now, which is shown unless the page shows the past. */
+  function live(signal, value, raw, edges, flags) {
+    signal.live = [value, raw, edges, flags];
+    return signal.live;
+  }
+
+  function show(signal, value, raw, edges, flags) {
     signal.value = value;
     signal.raw = raw;
     signal.edges = edges;
@@ -52,10 +76,11 @@ const plant = (() => {
     signal.isStale = (flags & STALE) !== 0;
   }
 
-  /** Replaces the signals: signals that exist after a restart, too, keep their open trends. */
-  function takeAll(given, before) {
+  /** Replaces the signals: trends that were open stay open. */
+  function takeAll(given) {
     const known = new Map(signals.map((signal) => [keyOf(signal), signal]));
-    drivers = given.drivers.map((driver) => ({ ...driver, line: null }));
+    isPast = false;
+    drivers = given.drivers.map((driver) => ({ ...driver, line: null, past: null, moment: null }));
     signals = [];
     for (const driver of drivers) {
       driver.signals = driver.signals.map((it, index) => signalOf(driver, it, index));
@@ -63,17 +88,29 @@ const plant = (() => {
       for (const signal of driver.signals) {
         const old = known.get(keyOf(signal));
         signal.isOpen = old?.isOpen ?? false;
-        // The server has the missed values, coarsely.
-        if (old?.trend && old.index === signal.index && time - before < MISSED) {
-          signal.trend = old.trend;
-          trend.add(signal, time);
-        }
         signals.push(signal);
       }
     }
   }
 
   const keyOf = (signal) => `${signal.driver.id}/${signal.name}`;
+
+  /** Notes how far the histories reach, and how fast their time passes. */
+  function takePast(reaches) {
+    for (const driver of drivers) {
+      const reach = reaches?.[driver.id];
+      if (!reach) continue;
+      const [first, last, tick, isCut] = reach;
+      const past = driver.past ??= { from: heard, begin: last, speed: 1 };
+      const passed = heard - past.from;
+      // Over an interval, since single events come irregularly.
+      if (passed > ASSUMED) {
+        past.speed = Math.max(0, (last - past.begin) / passed);
+        [past.from, past.begin] = [heard, last];
+      }
+      Object.assign(past, { first, last, tick, isCut, heard });
+    }
+  }
 
   function takeLine(line) {
     for (const given of line.drivers) {
@@ -85,52 +122,99 @@ const plant = (() => {
   /** Applies an event. Returns whether the signals were replaced, and whether the line has changed. */
   function hear(text) {
     const event = JSON.parse(text);
-    // Another server has another clock: values collected by the old clock are not comparable.
-    if (event.full && event.time_ms < time) for (const signal of signals) signal.trend = null;
-    const before = time;
     time = event.time_ms;
     heard = performance.now();
     const isOther = event.full === true;
     if (isOther) {
       layout = event.layout;
-      takeAll(event.signals, before);
+      takeAll(event.signals);
     } else if (event.layout !== layout) {
       return { isOther: false, isLine: false };
     }
+    takePast(event.past);
     if (event.line) takeLine(event.line);
     for (const [id, changes] of Object.entries(event.values ?? {})) {
       const driver = drivers.find((driver) => String(driver.id) === id);
-      for (const [index, value, raw, edges, flags] of changes) {
+      for (const [index, value, raw = null, edges = null, flags = 0] of changes) {
         const signal = driver?.signals[index];
         if (!signal) continue;
+        const now = live(signal, value, raw ?? rawOf(signal.type, value), edges, flags);
+        if (isPast) continue;
         if (!Object.is(signal.value, value)) signal.changed = heard;
-        take(signal, value, raw, edges, flags);
-        if (signal.trend) trend.add(signal, time);
+        show(signal, ...now);
       }
     }
     return { isOther, isLine: Boolean(event.line) };
   }
 
-  /** The server's time, in milliseconds. */
-  const now = () => time + (performance.now() - heard);
+  /** Shows a moment of a driver's past: its answer, with all signals or those that differ from the moment shown now. */
+  function showPast(driver, moment, isStep) {
+    isPast = true;
+    for (const [index, value, raw = null, edges = null, flags = 0] of moment.values) {
+      const signal = driver.signals[index];
+      if (isStep && !Object.is(signal.value, value)) signal.changed = performance.now();
+      show(signal, value, raw ?? rawOf(signal.type, value), edges, flags);
+    }
+    driver.moment = { ...moment, values: null };
+  }
+
+  /** Shows the present again. */
+  function showPresent() {
+    isPast = false;
+    for (const driver of drivers) driver.moment = null;
+    for (const signal of signals) show(signal, ...signal.live);
+  }
+
+  /** The line of a driver, at the moment that is shown. */
+  function lineOf(driver) {
+    const { line, moment } = driver;
+    if (!line || !moment) return line;
+    const isStale = (status) => status < 0 || status > 1;
+    const statuses = moment.stations.length ? moment.stations : [moment.status];
+    const known = moment.line ?? { state: isStale(moment.status) ? "stale" : "running", cause: "unknown", reason: "" };
+    return {
+      ...line, ...known,
+      isPast: true,
+      status: ["fresh", "unchanged"][moment.status] ?? "stale",
+      stations: line.stations.map((station, i) => {
+        const stale = isStale(statuses[Math.min(i, statuses.length - 1)]);
+        return { ...station, stale, state: stale ? "stale" : "running", age_ms: null, reason: "" };
+      }),
+      faults: moment.faults.map((what) => ({ phase: "active", name: "forced: ", what })),
+      facts: [["Time", words.moment(moment.ms)]],
+      times: {}, counters: line.counters, tick: moment.tick, silence_ms: 0,
+    };
+  }
+
+  /** The time of a driver, in milliseconds: that of its history, or the page's without one. */
+  function now(driver) {
+    const { past } = driver;
+    if (!past) return time + (performance.now() - heard);
+    return past.last + Math.min(ASSUMED, performance.now() - past.heard) * past.speed;
+  }
 
   /** A value as a number; NaN without a value. */
   const number = (signal) => (signal.value === null ? NaN : Number(signal.value));
 
-  /** A value as a measurement: NaN while it is stale. */
-  const live = (signal) => (signal.isStale ? NaN : number(signal));
+  /** The value of now as a measurement: NaN while it is stale. */
+  const measured = ({ live: [value, , , flags] }) => (value === null || (flags & STALE) ? NaN : Number(value));
+
+  /** The marks of now, even while the past is shown. */
+  const isForcedNow = ({ live: [, , , flags] }) => (flags & FORCED) !== 0;
+  const isFailSafeNow = ({ live: [, , , flags] }) => (flags & FAIL_SAFE) !== 0;
 
   /** The age of the data of a signal's station, in milliseconds; null if unknown. */
   function age(signal) {
-    const line = signal.driver.line;
+    const line = lineOf(signal.driver);
     const age = line?.stations?.[signal.station]?.age_ms;
     return age === undefined || age === null ? null : age;
   }
 
   return {
-    hear, now, number, live, age, keyOf,
+    hear, now, number, measured, age, keyOf, lineOf, showPast, showPresent, isForcedNow, isFailSafeNow,
     isNew: (signal) => performance.now() - signal.changed < NEW,
     get drivers() { return drivers; },
+    get isPast() { return isPast; },
     get signals() { return signals; },
   };
 })();
@@ -160,6 +244,8 @@ const words = {
     if (ms < 7200000) return `${Math.floor(ms / 60000)} min`;
     return `${Math.floor(ms / 3600000)} h`;
   },
+  /** A time of a run in milliseconds. */
+  moment: (ms) => `${(ms / 1000).toFixed(3).replace("-", "−")} s`,
   /** A length of time in microseconds. */
   fine(us) {
     if (us < 1000) return `${Number(us.toPrecision(3))} µs`;

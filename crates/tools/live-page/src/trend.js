@@ -1,40 +1,25 @@
 "use strict";
 
-// The trend of a signal: the server's history and the values received since, drawn by the report's code.
+// The trends of signals: every change of every tick, from the server's history, drawn by the report's code.
 
 const trend = (() => {
   /** The selectable lengths, in milliseconds. */
   const LENGTHS = [15000, 60000, 300000];
-  /** The most values that the page keeps per signal. */
+  /** The time between two requests for what is new, in milliseconds. */
+  const PERIOD = 100;
+  /** The most values that the page keeps per signal without a history. */
   const MOST = 60000;
   let length = LENGTHS[1];
   let colours = null;
+  let isAsking = false;
 
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { colours = null; });
 
-  /** Begins to collect a signal, starting with the server's history. */
-  async function open(signal) {
+  /** Begins to collect a signal. */
+  function open(signal) {
     signal.isOpen = true;
-    if (signal.trend) return;
-    const mine = { times: [plant.now()], values: [plant.live(signal)], sampled: null };
-    signal.trend = mine;
-    try {
-      const answer = await room.ask(`/trend/${signal.driver.id}/${signal.index}`);
-      if (!answer.ok || signal.trend !== mine) return;
-      const kept = await answer.json();
-      const begin = mine.times[0];
-      const end = kept.ms.findIndex((time) => time >= begin);
-      const count = end < 0 ? kept.ms.length : end;
-      const times = kept.ms.slice(0, count).concat(mine.times);
-      const values = kept.values.slice(0, count).map((value) => value ?? NaN).concat(mine.values);
-      // Each point is drawn as a change.
-      const isChange = (_, i) => i === 0 || !Object.is(values[i], values[i - 1]);
-      mine.times = times.filter(isChange);
-      mine.values = values.filter(isChange);
-      mine.sampled = { until: begin, often: kept.samples_per_s };
-    } catch {
-      // Without the history, the trend begins now.
-    }
+    // The changes between `from` and `until` are known.
+    signal.trend ??= { times: [], values: [], from: Infinity, until: -Infinity, isSampled: false };
   }
 
   function close(signal) {
@@ -42,16 +27,89 @@ const trend = (() => {
     signal.trend = null;
   }
 
-  /** Adds a signal's new value. */
-  function add(signal, time) {
-    const data = signal.trend;
-    const value = plant.live(signal);
-    if (Object.is(value, data.values.at(-1))) return;
-    data.times.push(time);
-    data.values.push(value);
-    if (data.times.length <= MOST) return;
-    data.times.splice(0, MOST / 4);
-    data.values.splice(0, MOST / 4);
+  /** The time that a driver's trends show: its begin and end, and the moment that the page shows. */
+  function view(driver) {
+    const now = plant.now(driver);
+    if (!driver.moment) return { begin: now - length, end: now, at: now };
+    const at = driver.moment.ms;
+    const end = Math.min(Math.max(now, at), at + length / 4);
+    return { begin: end - length, end, at };
+  }
+
+  /** Requests what the open trends lack. */
+  async function collect() {
+    if (isAsking || document.hidden) return;
+    isAsking = true;
+    try {
+      await Promise.all(plant.drivers.map(collectOf));
+    } catch {
+      // The page says if the server does not answer; the next request follows.
+    }
+    isAsking = false;
+  }
+
+  async function collectOf(driver) {
+    const open = driver.signals.filter((signal) => signal.isOpen && signal.trend);
+    if (!driver.past) {
+      for (const signal of open) collectOwn(signal);
+      return;
+    }
+    if (!open.length) return;
+    const { begin, end } = view(driver);
+    const ask = [];
+    for (const signal of open) {
+      const { trend } = signal;
+      // What the server no longer has is not asked for again.
+      if (trend.from > Math.max(begin, driver.past.first) + 1 || trend.until < begin) Object.assign(trend, { times: [], values: [], from: Infinity, until: -Infinity });
+      if (trend.until < end && trend.until < driver.past.last) ask.push(signal);
+    }
+    // In one request, those that go on, and in another those that begin.
+    const groups = [ask.filter(({ trend }) => trend.times.length), ask.filter(({ trend }) => !trend.times.length)];
+    await Promise.all(groups.filter((group) => group.length).map(async (group) => {
+      const from = group[0].trend.times.length ? Math.min(...group.map(({ trend }) => trend.until)) : begin - length;
+      const to = driver.moment ? end + length : end + 1000;
+      const answer = await room.ask(`/trend/${driver.id}/${group.slice(0, 100).map(({ index }) => index).join(",")}/${from}/${to}`);
+      if (!answer.ok) return;
+      const news = await answer.json();
+      for (const { index, trend } of group) if (news.signals[index] && trend) add(trend, news.signals[index], news, from);
+    }));
+    list.redraw();
+  }
+
+  /** Adds the changes of an answer from a time on; each is drawn as an edge. */
+  function add(trend, { ms, values }, { to_ms: until, is_sampled: isSampled }, from) {
+    let known = trend.times.length;
+    while (known > 0 && trend.times[known - 1] > from) known -= 1;
+    trend.times.length = known;
+    trend.values.length = known;
+    ms.forEach((time, i) => {
+      const value = values[i] ?? NaN;
+      if (known + i > 0 && Object.is(value, trend.values.at(-1))) return;
+      trend.times.push(time);
+      trend.values.push(value);
+    });
+    trend.from = Math.min(trend.from, from);
+    trend.until = Math.max(trend.until, until);
+    trend.isSampled = isSampled;
+    if (trend.times.length > MOST) drop(trend);
+  }
+
+  /** Drops the oldest quarter. */
+  function drop(trend) {
+    trend.times.splice(0, MOST / 4);
+    trend.values.splice(0, MOST / 4);
+    trend.from = trend.times[0];
+  }
+
+  /** Without a history: the values that the page itself receives. */
+  function collectOwn(signal) {
+    const { trend } = signal;
+    const value = plant.measured(signal);
+    if (trend.times.length && Object.is(value, trend.values.at(-1))) return;
+    trend.times.push(plant.now(signal.driver));
+    trend.values.push(value);
+    trend.isSampled = true;
+    if (trend.times.length > MOST) drop(trend);
   }
 
   /** Draws a signal's trend on a canvas of this width. */
@@ -61,17 +119,24 @@ const trend = (() => {
     const axis = 20;
     const gutter = 58;
     const painted = { ctx, colours, left: gutter, width: Math.max(10, width - gutter - MARGIN), isNarrow: true, from: 0, to: length };
-    // The report's run ends now, which is 0 s on the axis.
-    run.begin = -length * run.unit;
-    run.end = length;
-    const begin = plant.now() - length;
-    const first = Math.max(0, indexAt(signal.trend.times, begin));
+    const { begin, end, at } = view(signal.driver);
+    // The moment that is shown is 0 s on the axis.
+    run.begin = (begin - at) * run.unit;
+    const { times: allTimes, values: allValues, until, isSampled } = signal.trend;
+    const known = Math.min(end, Math.max(until, plant.now(signal.driver)));
+    run.end = known - begin;
+    const first = Math.max(0, indexAt(allTimes, begin));
     const data = {
-      times: signal.trend.times.slice(first).map((time) => time - begin),
-      values: signal.trend.values.slice(first),
+      times: allTimes.slice(first).map((time) => time - begin),
+      values: allValues.slice(first),
     };
+    const value = plant.measured(signal);
+    // The value of now is here before the server's next answer.
+    if (!signal.driver.moment && data.times.length && !Object.is(value, data.values.at(-1))) {
+      data.times.push(Math.max(until - begin, data.times.at(-1)));
+      data.values.push(value);
+    }
     paintGrid(painted, height - axis);
-    paintSampled(painted, signal.trend.sampled, begin, height - axis);
     paintUnknown(painted, data, height - axis);
     const [top, bottom] = [6, height - axis - 5];
     ctx.save();
@@ -90,7 +155,9 @@ const trend = (() => {
       if (low === high) [low, high] = [low - 1, high + 1];
       paintReal(painted, { low, high }, data, top, bottom);
     }
+    if (signal.driver.moment) paintMoment(painted, at - begin, height - axis);
     ctx.restore();
+    if (isSampled) paintSampled(painted, signal.driver.past !== null);
     ctx.font = SMALL;
     ctx.fillStyle = colours.soft;
     ctx.textAlign = "right";
@@ -102,21 +169,19 @@ const trend = (() => {
     paintAxis(painted, axis);
   }
 
-  /** Paints the time of which only samples are known, and their number. */
-  function paintSampled({ ctx, colours, left, width, to }, sampled, begin, height) {
-    const end = sampled ? (sampled.until - begin) / to * width : 0;
-    if (end <= 0) return;
-    ctx.globalAlpha = 0.5;
-    ctx.fillStyle = colours.idle;
-    ctx.fillRect(left, 0, end, height);
-    ctx.globalAlpha = 1;
-    ctx.fillStyle = colours["idle-text"];
-    ctx.fillRect(left + end - 1, 0, 1, height);
+  /** Paints the moment that the page shows. */
+  function paintMoment({ ctx, colours, left, width, to }, time, height) {
+    ctx.fillStyle = colours.cursor;
+    ctx.fillRect(left + time / to * width - 0.75, 0, 1.5, height);
+  }
+
+  /** Says that not every change is there. */
+  function paintSampled({ ctx, colours, left, width }, isOfRun) {
     ctx.font = SMALL;
-    ctx.textAlign = "right";
+    ctx.textAlign = "left";
     ctx.textBaseline = "top";
-    const text = fitted(ctx, `${sampled.often} samples a second until here`, end - 8);
-    if (text.length > 3) ctx.fillText(text, left + end - 4, height / 2 - 5);
+    ctx.fillStyle = colours.soft;
+    ctx.fillText(fitted(ctx, isOfRun ? "the steps that this page has seen" : "samples: this page has no history", width - 8), left + 4, 1);
   }
 
   /** Paints the time without a valid value. */
@@ -125,7 +190,7 @@ const trend = (() => {
     values.forEach((value, i) => {
       if (!Number.isNaN(value)) return;
       const x = left + Math.max(0, times[i]) / to * width;
-      const end = left + Math.min(to, times[i + 1] ?? to) / to * width;
+      const end = left + Math.min(run.end, times[i + 1] ?? run.end) / to * width;
       if (end <= x) return;
       ctx.fillStyle = colours.stale;
       ctx.fillRect(x, 0, end - x, height);
@@ -139,5 +204,6 @@ const trend = (() => {
     return length;
   }
 
-  return { open, close, add, draw, next, get length() { return length; } };
+  setInterval(collect, PERIOD);
+  return { open, close, draw, next, collect, get length() { return length; } };
 })();

@@ -74,6 +74,38 @@ pub(crate) fn raw(data_type: DataType, bits: u64) -> String {
     format!("16#{bits:0digits$X}")
 }
 
+/// True if the bits of a value are those of its number, so that a page can make the raw value itself.
+pub(crate) fn raw_follows(signal: &Signal, slot: Slot, bits: u64) -> bool {
+    if signal.scale.is_some() || signal.is_integer_slot() {
+        return false;
+    }
+    let value = slot.real();
+    // As JSON it may lose its sign.
+    if value == 0.0 && value.is_sign_negative() {
+        return false;
+    }
+    #[expect(clippy::cast_possible_truncation, reason = "compared with what it was")]
+    match signal.data_type {
+        DataType::Bool => bits == u64::from(value == 1.0) && (value == 0.0 || value == 1.0),
+        DataType::Real => {
+            !value.is_nan()
+                && f64::from(value as f32).to_bits() == value.to_bits()
+                && u64::from((value as f32).to_bits()) == bits
+        }
+        DataType::Lreal => !value.is_nan() && value.to_bits() == bits,
+        // Of at most 32 bits.
+        data_type => {
+            let mask = u64::MAX >> (64 - data_type.width().bits());
+            value.fract() == 0.0
+                && value.abs() < WHOLE
+                && (value as i64).cast_unsigned() & mask == bits
+                && data_type
+                    .range()
+                    .is_some_and(|range| range.contains(&i128::from(value as i64)))
+        }
+    }
+}
+
 /// Parses the value of a signal: in its unit, or a literal such as `16#6C00` for an integer without a scale.
 ///
 /// # Errors

@@ -52,6 +52,7 @@ impl Line {
         let mut config = config.map_err(|mistakes| mistakes.to_string())?;
         // That belongs to the simulation.
         config.record = None;
+        config.page.get_or_insert_default();
         let Opened { program, options } = machine(&config)?;
         let host = Host::open(&config, program, TICK, Monotonic::shared() as Arc<_>);
         let host = host.map_err(|error| error.to_string())?;

@@ -343,7 +343,7 @@ mod tests {
         };
         let (config, board) = (Arc::new(config), Arc::clone(&figures.board));
         let shared = Arc::clone(&config);
-        let (tap, _watch) = Watch::new(shared, Manual::new(), figures, false);
+        let (tap, _watch) = Watch::new(shared, Manual::new(), (figures, None), false);
         cpu.own = Some(OwnEnd::new(config, &board, tap, None).expect("it has no faults"));
         (cpu, bus)
     }

@@ -152,7 +152,9 @@ impl HostThread {
         if is_own {
             port = port.with_swallowed(hosted.swallowed);
             let (config, clock) = (Arc::new(config.clone()), Arc::clone(&counters.clock));
-            let (tap, own) = Watch::new(Arc::clone(&config), clock, figures.clone(), false);
+            let history = hosted.recorder.as_ref().and_then(Recorder::history);
+            let history = (figures.clone(), history.map(Arc::clone));
+            let (tap, own) = Watch::new(Arc::clone(&config), clock, history, false);
             watch = Some(own);
             let end = OwnEnd::new(config, &board, tap, hosted.recorder);
             let mut end = end.map_err(DriverError::Fault)?;

@@ -1,0 +1,352 @@
+//! The past of one exhibit: its history, the faults and the states of its line, as JSON.
+
+use std::collections::VecDeque;
+use std::fmt::Write as _;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use serde_json::json;
+use tickbus_base::time::Nanos;
+use tickbus_fieldbus::faults::{FaultStatus, Phase};
+use tickbus_fieldbus::{Link, LinkState};
+use tickbus_image::signal::{Area, SignalTable};
+use tickbus_record::{Goal, History, Moment, Span, Tick};
+
+use crate::codec::Codec;
+use crate::sheet::{ChangeJson, FAIL_SAFE, FORCED, Row, STALE};
+
+/// The most faults and states of the line that are remembered.
+const MOST: usize = 10_000;
+
+/// The beginning of the name of the fault that forces a signal.
+const FORCE: &str = "forced: ";
+
+/// The facts that the values of a history need to be shown.
+#[derive(Debug)]
+pub(crate) struct Facts {
+    pub(crate) table: SignalTable,
+    /// The area that this end reads, whose values can be stale; without one, every value can be.
+    pub(crate) reads: Option<Area>,
+    /// True if stale values are fail-safe ones.
+    pub(crate) is_fail_safe: bool,
+    /// Some samples, and not every tick.
+    pub(crate) is_sampled: bool,
+    /// True if values have raw bits.
+    pub(crate) has_bits: bool,
+}
+
+/// The past of an exhibit; the page's thread writes it, and the thread for the past reads it.
+#[derive(Debug)]
+pub(crate) struct Archive {
+    pub(crate) history: Arc<History>,
+    pub(crate) facts: Facts,
+    /// Per signal, the column of its edges.
+    edges: Vec<Option<usize>>,
+    codec: Mutex<Codec>,
+    notes: Mutex<Notes>,
+}
+
+#[derive(Debug, Default)]
+struct Notes {
+    marks: VecDeque<Mark>,
+    /// The faults as last seen: number, phase, beginnings.
+    seen: Vec<(u32, Phase, u64)>,
+    lines: VecDeque<LineNote>,
+}
+
+/// A fault has begun or ended.
+#[derive(Clone, Debug)]
+struct Mark {
+    tick: u64,
+    name: String,
+    text: String,
+    begins: bool,
+}
+
+/// The line has entered a state.
+#[derive(Clone, Debug)]
+struct LineNote {
+    at: Nanos,
+    state: LinkState,
+    cause: &'static str,
+    reason: String,
+}
+
+/// Time as the page has it, in milliseconds.
+#[expect(clippy::cast_precision_loss, reason = "exact for a hundred days")]
+pub(crate) fn millis(time: Nanos) -> f64 {
+    time.0 as f64 / 1e6
+}
+
+impl Archive {
+    pub(crate) fn new(history: Arc<History>, facts: Facts) -> Self {
+        let signals = facts.table.signals.iter();
+        let columns = history.columns();
+        let edges = signals.map(|signal| columns.position(&signal.name, true));
+        Self {
+            edges: edges.collect(),
+            codec: Mutex::new(Codec::new(&facts.table)),
+            facts,
+            history,
+            notes: Mutex::default(),
+        }
+    }
+
+    fn notes(&self) -> MutexGuard<'_, Notes> {
+        // Each list is consistent after every single change.
+        self.notes.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Notes the faults that have begun or ended.
+    pub(crate) fn note_faults(&self, faults: &[FaultStatus]) {
+        let mut notes = self.notes();
+        let Notes { marks, seen, .. } = &mut *notes;
+        for fault in faults {
+            let now = (fault.id, fault.phase, fault.begun);
+            let place = seen.iter_mut().find(|(id, ..)| *id == fault.id);
+            let is_new = match place {
+                Some(known) => std::mem::replace(known, now) != now,
+                None => {
+                    seen.push(now);
+                    fault.begun > 0
+                }
+            };
+            if !is_new || fault.begun == 0 {
+                continue;
+            }
+            if marks.len() == MOST {
+                marks.pop_front();
+            }
+            marks.push_back(Mark {
+                tick: fault.tick,
+                name: fault.name.clone(),
+                text: match fault.name.strip_prefix(FORCE) {
+                    Some(_) => fault.what.clone(),
+                    None if fault.name.is_empty() => format!("{}: {}", fault.kind, fault.what),
+                    None => format!("{}: {}", fault.name, fault.what),
+                },
+                begins: fault.phase == Phase::Active,
+            });
+        }
+        if seen.len() > MOST {
+            seen.drain(..MOST / 2);
+        }
+    }
+
+    /// Notes the state of the line; `now` is the time on the clock of the line.
+    pub(crate) fn note_line(&self, link: &Link, now: Nanos) {
+        let Some(span) = self.history.span() else {
+            return;
+        };
+        let mut notes = self.notes();
+        let lines = &mut notes.lines;
+        let cause = link.cause.name();
+        let is_same = lines.back().is_some_and(|last| {
+            (last.state, last.cause, &*last.reason) == (link.state, cause, &*link.reason)
+        });
+        if is_same {
+            return;
+        }
+        if lines.len() == MOST {
+            lines.pop_front();
+        }
+        let least = lines.back().map_or(Nanos(i64::MIN), |last| last.at);
+        lines.push_back(LineNote {
+            at: (span.last.1 - (now - link.since).max(Nanos::ZERO)).max(least),
+            state: link.state,
+            cause,
+            reason: link.reason.clone(),
+        });
+    }
+
+    /// How far it reaches, for every event.
+    pub(crate) fn reach(&self) -> Option<String> {
+        let Span {
+            first,
+            last,
+            is_cut,
+            ..
+        } = self.history.span()?;
+        let (from, to) = (millis(first.1), millis(last.1));
+        Some(format!("[{from},{to},{},{is_cut}]", last.0))
+    }
+
+    /// All that the bar of time shows.
+    pub(crate) fn overview(&self) -> String {
+        let span = self.history.span();
+        let outages = self.history.outages();
+        let outages: Vec<_> = outages
+            .iter()
+            .map(|(begin, end)| (millis(*begin), end.map(millis)))
+            .collect();
+        let marks = self.notes().marks.clone();
+        let marks: Vec<_> = marks
+            .iter()
+            .filter(|mark| span.is_some_and(|span| (span.first.0..=span.last.0).contains(&mark.tick)))
+            .filter_map(|mark| {
+                let tick = self.history.at(Moment::Tick(mark.tick))?;
+                Some(json!({
+                    "ms": millis(tick.time), "tick": mark.tick, "text": mark.text, "begins": mark.begins,
+                }))
+            })
+            .collect();
+        json!({
+            "from_ms": span.map(|span| millis(span.first.1)),
+            "to_ms": span.map(|span| millis(span.last.1)),
+            "from_tick": span.map(|span| span.first.0),
+            "to_tick": span.map(|span| span.last.0),
+            "is_cut": span.is_some_and(|span| span.is_cut),
+            "bytes": span.map_or(0, |span| span.bytes),
+            "limit": self.history.limit(),
+            "is_sampled": self.facts.is_sampled,
+            "outages": outages,
+            "marks": marks,
+        })
+        .to_string()
+    }
+
+    /// The faults that are on at a tick.
+    fn faults_at(&self, tick: u64) -> Vec<Mark> {
+        let notes = self.notes();
+        let mut on: Vec<Mark> = Vec::new();
+        for mark in notes.marks.iter().filter(|mark| mark.tick <= tick) {
+            on.retain(|other| other.name != mark.name || other.text != mark.text);
+            if mark.begins {
+                on.push(mark.clone());
+            }
+        }
+        on
+    }
+
+    /// The rows of a tick.
+    fn rows(&self, tick: &Tick, faults: &[Mark]) -> Vec<Row> {
+        let table = &self.facts.table;
+        // The tables are consistent after a panic as well: every tick fills them again.
+        let mut codec = self.codec.lock().unwrap_or_else(PoisonError::into_inner);
+        if self.facts.has_bits {
+            codec.take(table, &tick.values);
+        }
+        let rows = table.signals.iter().enumerate().map(|(index, signal)| {
+            let status = tick.stations.get(signal.station).unwrap_or(&tick.status);
+            let can_be_stale = self.facts.reads.is_none_or(|reads| reads == signal.area);
+            let is_forced = faults
+                .iter()
+                .any(|mark| mark.name.strip_prefix(FORCE) == Some(&signal.name));
+            let flags = if is_forced {
+                FORCED
+            } else if can_be_stale && !(0..2).contains(status) {
+                STALE
+                    | if self.facts.is_fail_safe {
+                        FAIL_SAFE
+                    } else {
+                        0
+                    }
+            } else {
+                0
+            };
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "a whole number, which wraps as the driver's counter does"
+            )]
+            let edges =
+                self.edges[index].map_or(0, |column| tick.values[column].real() as u64 as u32);
+            Row {
+                slot: tick.values[index],
+                bits: if self.facts.has_bits {
+                    codec.bits(signal, index)
+                } else {
+                    0
+                },
+                edges,
+                flags,
+                number: 0,
+            }
+        });
+        rows.collect()
+    }
+
+    /// The state at a moment: of all signals, or of those that differ from the state at the tick `since`.
+    pub(crate) fn state(&self, moment: Moment, since: Option<u64>) -> Option<String> {
+        let tick = self.history.at(moment)?;
+        let faults = self.faults_at(tick.number);
+        let rows = self.rows(&tick, &faults);
+        let before = since.and_then(|since| {
+            let before = self.history.at(Moment::Tick(since))?;
+            // It may have been dropped meanwhile.
+            (before.number == since).then(|| self.rows(&before, &self.faults_at(since)))
+        });
+        let signals = &self.facts.table.signals;
+        let changes = rows.iter().enumerate().filter(|(index, row)| {
+            before.as_ref().is_none_or(|before| {
+                let before = &before[*index];
+                (before.slot, before.edges, before.flags) != (row.slot, row.edges, row.flags)
+            })
+        });
+        let changes: Vec<ChangeJson> = changes
+            .map(|(index, row)| {
+                let mut change = row.json(index, &signals[index]);
+                if !self.facts.has_bits {
+                    change.raw = None;
+                }
+                change
+            })
+            .collect();
+        let line = {
+            let notes = self.notes();
+            let at = notes.lines.partition_point(|line| line.at <= tick.time);
+            at.checked_sub(1).map(|at| notes.lines[at].clone())
+        };
+        let line = line.map(|line| {
+            json!({
+                "state": line.state.name(), "cause": line.cause, "reason": line.reason,
+                "since_ms": millis(tick.time - line.at),
+            })
+        });
+        let texts: Vec<_> = faults.iter().map(|mark| &mark.text).collect();
+        let head = json!({
+            "tick": tick.number, "ms": millis(tick.time), "status": tick.status, "stations": tick.stations,
+            "dropped": tick.dropped, "full": before.is_none(), "line": line, "faults": texts,
+        });
+        let mut text = head.to_string();
+        text.pop();
+        let values = serde_json::to_string(&changes).expect("texts and numbers");
+        // Writing to a String cannot fail.
+        let _ = write!(text, ",\"values\":{values}}}");
+        Some(text)
+    }
+
+    /// The next tick after this one that has what was asked for, or the last one before it; `None` if that is unknown.
+    pub(crate) fn jump(&self, what: &str, is_forward: bool, from: u64) -> Option<String> {
+        let found = match what {
+            "outage" => self.history.search(from, is_forward, Goal::Outage),
+            "fault" => {
+                let marks = self.notes().marks.clone();
+                let aside = |mark: &&Mark| {
+                    mark.begins && mark.tick != from && (mark.tick > from) == is_forward
+                };
+                let mut ticks: Vec<u64> =
+                    marks.iter().filter(aside).map(|mark| mark.tick).collect();
+                ticks.sort_unstable();
+                let tick = if is_forward {
+                    ticks.first()
+                } else {
+                    ticks.last()
+                };
+                let tick = tick.and_then(|tick| self.history.at(Moment::Tick(*tick)));
+                tick.map(|tick| (tick.number, tick.time))
+                    .filter(|(number, _)| *number != from && (*number > from) == is_forward)
+            }
+            index => {
+                let index = index.parse().ok()?;
+                self.facts.table.signals.get(index)?;
+                self.history.search(from, is_forward, Goal::Change(index))
+            }
+        };
+        let found = found.map(|(tick, time)| json!({ "tick": tick, "ms": millis(time) }));
+        Some(
+            found
+                .map_or_else(|| json!({ "tick": null }), |found| found)
+                .to_string(),
+        )
+    }
+}

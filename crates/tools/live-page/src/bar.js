@@ -1,0 +1,257 @@
+"use strict";
+
+// The bar of time: pauses the page, and shows any moment of the histories of the drivers, while the present goes on.
+
+const bar = (() => {
+  const get = (id) => document.getElementById(id);
+  const range = get("scrub");
+  const canvas = get("bands");
+  /** The time between two looks at the outages and faults, in milliseconds. */
+  const PERIOD = 1000;
+  let act = {};
+  /** The driver whose time the bar shows. */
+  let lead = null;
+  /** How much later another driver's time is than the lead's, by its id, in milliseconds. */
+  let offsets = new Map();
+  /** The moment that the lead shows: `{ ms, tick }`; null for the present. */
+  let moment = null;
+  /** The moment to show next, and whether one is on its way. */
+  let wanted = null;
+  let isBusy = false;
+  let isDragged = false;
+  let overview = { outages: [], marks: [] };
+  let looked = -Infinity;
+  let colours = null;
+  /** For measurements: how long the moments took from the request to the picture, in milliseconds. */
+  const frames = [];
+
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { colours = null; });
+
+  const path = (driver, rest) => `/history/${driver.id}/${rest}`;
+
+  /** The place of a moment in another driver's time. */
+  const placeOf = (driver, place) => (driver === lead || !moment ? place : `at/${moment.ms + (offsets.get(driver.id) ?? 0)}`);
+
+  /** Requests a moment of one driver, and shows it. */
+  async function fetchOne(driver, place, isStep) {
+    const since = driver.moment ? `/since/${driver.moment.tick}` : "";
+    const answer = await room.ask(path(driver, placeOf(driver, place) + since));
+    if (!answer.ok) throw new Error((await answer.json()).text);
+    const state = await answer.json();
+    if (!plant.drivers.includes(driver)) return null;
+    return () => plant.showPast(driver, state, isStep);
+  }
+
+  /** Shows a moment of the lead: `at/MS`, `tick/NUMBER` or `after/NUMBER`. While one is on its way, the newest one waits. */
+  async function show(place, isStep = false) {
+    if (!lead) return;
+    wanted = { place, isStep };
+    if (isBusy) return;
+    isBusy = true;
+    if (!moment) {
+      offsets = new Map(plant.drivers.filter(({ past }) => past).map((driver) => [driver.id, driver.past.last - lead.past.last]));
+    }
+    while (wanted) {
+      const { place, isStep } = wanted;
+      wanted = null;
+      const begun = performance.now();
+      try {
+        const first = await fetchOne(lead, place, isStep);
+        if (!first || (wanted && wanted.isLive)) break;
+        first();
+        moment = { ms: lead.moment.ms, tick: lead.moment.tick };
+        const others = plant.drivers.filter((driver) => driver !== lead && driver.past);
+        for (const shown of await Promise.all(others.map((driver) => fetchOne(driver, "", isStep)))) shown?.();
+      } catch (error) {
+        act.say(`The past cannot be shown: ${error.message}`, true);
+        break;
+      }
+      if (wanted?.isLive) break;
+      act.shown();
+      await new Promise((go) => requestAnimationFrame(go));
+      frames.push(performance.now() - begun);
+      if (frames.length > 1000) frames.shift();
+    }
+    isBusy = false;
+    if (wanted?.isLive) leave();
+  }
+
+  /** Returns to the present. */
+  function live() {
+    wanted = isBusy ? { isLive: true } : null;
+    if (!isBusy) leave();
+  }
+
+  function leave() {
+    wanted = null;
+    moment = null;
+    plant.showPresent();
+    act.shown();
+  }
+
+  const pause = () => show(`at/${lead.past.last}`);
+
+  /** Goes by single ticks. */
+  function step(by) {
+    if (!lead) return;
+    const from = moment ? moment.tick : lead.past.tick;
+    show(by < 0 ? `tick/${from - 1}` : `after/${from}`, true);
+  }
+
+  /** Goes to the next outage, fault or change, or to the last one. */
+  async function jump(isForward) {
+    if (!lead) return;
+    const goal = get("goal").value;
+    const signal = act.chosen();
+    if (goal === "signal" && !signal) return act.say("Choose the signal whose change you look for.", true);
+    const driver = goal === "signal" ? signal.driver : lead;
+    const from = driver.moment?.tick ?? (driver.past ? driver.past.tick + 1 : 0);
+    const what = goal === "signal" ? signal.index : goal;
+    const name = goal === "signal" ? `change of ${signal.name}` : goal;
+    try {
+      const answer = await room.ask(path(driver, `${isForward ? "next" : "last"}/${what}/${from}`));
+      const found = await answer.json();
+      if (!answer.ok) return act.say(found.text, true);
+      if (found.tick === null) return act.say(`There is no ${isForward ? "later" : "earlier"} ${name} in the recorded time.`, true);
+      act.say("");
+      // In the lead's time, if the signal is another driver's.
+      if (driver === lead) await show(`tick/${found.tick}`, true);
+      else await show(`at/${found.ms - (offsets.get(driver.id) ?? driver.past.last - lead.past.last)}`, true);
+    } catch {
+      act.say("Nobody answers; look at the values when the page is live again.", true);
+    }
+  }
+
+  /** Saves the time before the shown moment. */
+  async function save(ending) {
+    const driver = act.chosen()?.driver ?? lead;
+    if (!driver?.past) return;
+    const until = driver.moment?.ms ?? driver.past.last;
+    const span = Number(get("save-span").value);
+    const from = span ? Math.max(driver.past.first, until - span) : driver.past.first;
+    act.say("The file is being made.");
+    try {
+      // It may take longer than other requests.
+      const answer = await fetch(path(driver, `save/${from}/${until}.${ending}`));
+      if (!answer.ok) return act.say("The file was not made: it is too large. Choose a shorter time.", true);
+      const link = document.createElement("a");
+      link.href = URL.createObjectURL(await answer.blob());
+      link.download = `${driver.name.replace(/[^\w.-]+/g, "_")}-${words.moment(until).replace(/[^\d.]/g, "")}s.${ending}`;
+      link.click();
+      setTimeout(() => URL.revokeObjectURL(link.href), 60000);
+      act.say(`Saved: ${link.download}, from ${words.moment(from)} to ${words.moment(until)} of ${driver.name}.`);
+    } catch {
+      act.say("The file was not made: nobody answers.", true);
+    }
+  }
+
+  /** Looks at the outages and faults. */
+  async function look() {
+    if (!lead?.past || document.hidden || performance.now() - looked < PERIOD) return;
+    looked = performance.now();
+    const driver = lead;
+    try {
+      const answer = await room.ask(path(driver, "").slice(0, -1));
+      if (answer.ok && driver === lead) overview = await answer.json();
+    } catch {
+      // The page says if the server does not answer.
+    }
+  }
+
+  function paint() {
+    colours ??= coloursAt(document.body);
+    const [width, height] = [canvas.clientWidth, 10];
+    const ctx = context(canvas, width, height);
+    const { first, last } = lead.past;
+    // As wide as the way of the handle.
+    const x = (ms) => 8 + (ms - first) / Math.max(1, last - first) * (width - 16);
+    ctx.fillStyle = colours.idle;
+    ctx.fillRect(x(first), 3, x(last) - x(first), 4);
+    for (const [begin, end] of overview.outages) {
+      const [left, right] = [x(Math.max(first, begin)), x(Math.min(last, end ?? last))];
+      if (right < left) continue;
+      ctx.fillStyle = colours["stale-text"];
+      ctx.fillRect(left, 2, Math.max(2, right - left), 6);
+    }
+    ctx.fillStyle = colours.bad;
+    for (const { ms, begins } of overview.marks) if (begins && ms >= first) ctx.fillRect(x(ms) - 1, 0, 2, height);
+  }
+
+  function text(element, value) {
+    if (element.textContent !== value) element.textContent = value;
+  }
+
+  /** Shows the state of the bar. */
+  function redraw() {
+    if (!plant.drivers.includes(lead)) {
+      lead = plant.drivers.find(({ past }) => past) ?? null;
+      moment = null;
+      overview = { outages: [], marks: [] };
+      looked = -Infinity;
+    }
+    lead ??= plant.drivers.find(({ past }) => past) ?? null;
+    get("bar").hidden = !lead?.past;
+    if (!lead?.past) return;
+    const { first, last, isCut } = lead.past;
+    document.body.classList.toggle("is-past", Boolean(moment));
+    range.min = first;
+    range.max = last;
+    const at = moment?.ms ?? last;
+    if (!isDragged) range.value = at;
+    const now = plant.now(lead);
+    const ago = now - at;
+    const span = words.span(Math.max(0, last - first));
+    range.setAttribute("aria-valuetext", moment ? `${words.moment(at)}, tick ${moment.tick}, ${words.span(ago)} ago` : "live");
+    get("pause").hidden = Boolean(moment);
+    get("to-live").hidden = !moment;
+    if (moment) text(get("to-live"), `Live: +${words.span(ago)}`);
+    text(get("moment"), moment ? `${words.moment(at)} · tick ${moment.tick.toLocaleString("en")}` : `the last ${span}${isCut ? "" : ", from the start"}`);
+    const chosen = act.chosen();
+    text(get("goal-signal"), chosen ? `change of ${chosen.name}` : "change of a signal");
+    if (moment && moment.ms < first) act.say("The oldest moments have left the memory; the page shows the oldest that is left.");
+    paint();
+  }
+
+  range.addEventListener("input", () => show(`at/${range.value}`));
+  range.addEventListener("pointerdown", () => { isDragged = true; });
+  for (const name of ["pointerup", "pointercancel", "change"]) range.addEventListener(name, () => { isDragged = false; });
+  get("pause").addEventListener("click", () => {
+    pause();
+    range.focus();
+  });
+  get("to-live").addEventListener("click", () => {
+    live();
+    range.focus();
+  });
+  get("step-back").addEventListener("click", () => step(-1));
+  get("step-forth").addEventListener("click", () => step(1));
+  get("last-goal").addEventListener("click", () => jump(false));
+  get("next-goal").addEventListener("click", () => jump(true));
+  get("save").addEventListener("click", (event) => {
+    const ending = event.target.closest("button")?.dataset.ending;
+    if (ending) save(ending);
+  });
+
+  /** A key of the page; returns whether the bar has used it. */
+  function key(event) {
+    if (!lead?.past) return false;
+    const isOwn = event.target === range;
+    if (event.key === "ArrowLeft") step(-1);
+    else if (event.key === "ArrowRight") step(1);
+    else if (event.key === "p" || event.key === "P") {
+      if (moment) live();
+      else pause();
+    } else if (isOwn && event.key === "Home") show(`at/${lead.past.first}`);
+    else if (isOwn && event.key === "End") live();
+    else return false;
+    return true;
+  }
+
+  setInterval(look, PERIOD);
+  return {
+    redraw, key, show, live, step, jump, frames,
+    /** Sets what the page does: `say(text, isBad)`, `shown()`, `chosen()`. */
+    begin(actions) { act = actions; },
+    get moment() { return moment; },
+  };
+})();

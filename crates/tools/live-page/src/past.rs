@@ -1,0 +1,256 @@
+//! The requests about the past, on a thread of their own: a search through a long history must not delay the present.
+
+use std::collections::BTreeMap;
+use std::io::{self, Cursor};
+use std::sync::Arc;
+use std::sync::mpsc::{Sender, channel};
+use std::thread::{self, JoinHandle};
+
+use serde_json::json;
+use tickbus_base::time::Nanos;
+use tickbus_record::{Format, Moment, Recording, TrendPoint};
+use tickbus_report::{Contents, DEFAULT_BUDGET};
+use tickbus_web::{Answer, Document};
+
+use crate::archive::{Archive, millis};
+use crate::exhibit::Exhibit;
+use crate::model::Shared;
+use crate::value::Number;
+
+/// The paths of the past.
+const HISTORY: &str = "/history/";
+const TREND: &str = "/trend/";
+
+/// The length of a trend if none is asked for.
+const TREND_SPAN: Nanos = Nanos::from_secs(300);
+
+/// The most changes of a trend; of more, each of some spans has its first, least, greatest and last value.
+const MOST_POINTS: usize = 40_000;
+
+/// The most signals of one request for trends.
+const MOST_TRENDS: usize = 100;
+
+/// The largest file that is saved, in bytes.
+const LARGEST: usize = 512 << 20;
+
+const JSON: &str = "application/json";
+
+/// A request; `None` ends the thread.
+type Wish = Option<(String, Answer<Option<Document>>)>;
+
+/// The thread; dropping it ends it after the request that it works on.
+#[derive(Debug)]
+pub(crate) struct Past {
+    wishes: Sender<Wish>,
+    thread: Option<JoinHandle<()>>,
+}
+
+/// The way to the thread.
+#[derive(Clone, Debug)]
+pub(crate) struct Door(Sender<Wish>);
+
+impl Past {
+    pub(crate) fn open(model: Arc<Shared>) -> io::Result<(Self, Door)> {
+        let (wishes, taken) = channel::<Wish>();
+        let thread = thread::Builder::new().name("page past".to_owned());
+        let thread = thread.spawn(move || {
+            // Doors may be left after the end, so the end of the queue is no signal.
+            while let Ok(Some((path, answer))) = taken.recv() {
+                answer.give(document(&model, &path));
+            }
+        })?;
+        let door = Door(wishes.clone());
+        let past = Self {
+            wishes,
+            thread: Some(thread),
+        };
+        Ok((past, door))
+    }
+}
+
+impl Drop for Past {
+    fn drop(&mut self) {
+        // A thread that has ended is not there to be told.
+        let _ = self.wishes.send(None);
+        if let Some(thread) = self.thread.take() {
+            // A panic has been reported already.
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Door {
+    /// True if a path is one of the past.
+    pub(crate) fn leads_to(path: &str) -> bool {
+        path.starts_with(HISTORY) || path.starts_with(TREND)
+    }
+
+    pub(crate) fn ask(&self, path: &str, answer: Answer<Option<Document>>) {
+        // After the end nobody answers, which the room reports.
+        let _ = self.0.send(Some((path.to_owned(), answer)));
+    }
+}
+
+/// The document at a path.
+fn document(model: &Shared, path: &str) -> Option<Document> {
+    if let Some(path) = path.strip_prefix(TREND) {
+        let (id, path) = path.split_once('/')?;
+        return trends(&*archive(model, id)?, path);
+    }
+    let mut parts = path.strip_prefix(HISTORY)?.split('/');
+    let archive = archive(model, parts.next()?)?;
+    let parts: Vec<&str> = parts.collect();
+    let text = match parts[..] {
+        [] => archive.overview(),
+        [kind, place] => archive.state(moment(kind, place)?, None)?,
+        [kind, place, "since", tick] => {
+            archive.state(moment(kind, place)?, Some(tick.parse().ok()?))?
+        }
+        ["next", what, tick] => archive.jump(what, true, tick.parse().ok()?)?,
+        ["last", what, tick] => archive.jump(what, false, tick.parse().ok()?)?,
+        ["save", from, file] => return save(&archive, from, file),
+        _ => return None,
+    };
+    Some(Document { kind: JSON, text })
+}
+
+/// The past of the exhibit with this id.
+fn archive(model: &Shared, id: &str) -> Option<Arc<Archive>> {
+    let id = id.parse().ok()?;
+    model.with(|model| model.driver(id).and_then(Exhibit::archive))
+}
+
+fn moment(kind: &str, place: &str) -> Option<Moment> {
+    match kind {
+        "at" => time(place).map(Moment::Time),
+        "tick" => place.parse().ok().map(Moment::Tick),
+        "after" => place.parse().ok().map(Moment::After),
+        _ => None,
+    }
+}
+
+/// A time in milliseconds.
+fn time(text: &str) -> Option<Nanos> {
+    let millis: f64 = text
+        .parse()
+        .ok()
+        .filter(|millis: &f64| millis.is_finite())?;
+    #[expect(clippy::cast_possible_truncation, reason = "a cast saturates")]
+    let nanos = (millis * 1e6).round() as i64;
+    Some(Nanos(nanos))
+}
+
+/// The trends of signals: `INDEX,INDEX/FROM/TO`, or `INDEX` for the last minutes.
+fn trends(archive: &Archive, path: &str) -> Option<Document> {
+    let span = archive.history.span();
+    let last = span.map_or(Nanos::ZERO, |span| span.last.1);
+    let parts: Vec<&str> = path.split('/').collect();
+    let (indices, from, to) = match parts[..] {
+        [index] => (index, last - TREND_SPAN, last),
+        [indices, from, to] => (indices, time(from)?, time(to)?),
+        _ => return None,
+    };
+    let one = |index: usize| {
+        let signal = archive.facts.table.signals.get(index)?;
+        let can_be_stale = archive.facts.reads.is_none_or(|reads| reads == signal.area);
+        let station = can_be_stale.then_some(signal.station);
+        let points = archive.history.trend(index, station, (from, to));
+        let value = |slot| Number::of(signal, slot).real();
+        let points: Vec<TrendPoint> = points;
+        let mut points: Vec<(Nanos, f64)> = points
+            .iter()
+            .map(|(at, slot)| (*at, slot.map_or(f64::NAN, value)))
+            .collect();
+        if points.len() > MOST_POINTS {
+            points = thinned(&points, (from.max(points[0].0), to.min(last)));
+        }
+        let (ms, values): (Vec<f64>, Vec<f64>) = points
+            .iter()
+            .map(|(at, value)| (millis(*at), *value))
+            .unzip();
+        Some(json!({ "ms": ms, "values": values }))
+    };
+    let indices: Option<Vec<usize>> = indices.split(',').map(|index| index.parse().ok()).collect();
+    let indices = indices.filter(|indices| indices.len() <= MOST_TRENDS)?;
+    let to_ms = millis(to.min(last));
+    if let ([index], 1) = (&indices[..], parts.len()) {
+        let mut trend = one(*index)?;
+        trend["to_ms"] = json!(to_ms);
+        return Some(Document {
+            kind: JSON,
+            text: trend.to_string(),
+        });
+    }
+    let trends: Option<BTreeMap<usize, _>> = indices
+        .into_iter()
+        .map(|index| Some((index, one(index)?)))
+        .collect();
+    let json =
+        json!({ "to_ms": to_ms, "is_sampled": archive.facts.is_sampled, "signals": trends? });
+    Some(Document {
+        kind: JSON,
+        text: json.to_string(),
+    })
+}
+
+/// Fewer points, without losing an extreme.
+fn thinned(points: &[(Nanos, f64)], (from, to): (Nanos, Nanos)) -> Vec<(Nanos, f64)> {
+    let spans = i64::try_from(MOST_POINTS / 4).unwrap_or(1);
+    let length = ((to - from).0 / spans).max(1);
+    let mut thin: Vec<(Nanos, f64)> = Vec::with_capacity(MOST_POINTS);
+    for group in points.chunk_by(|a, b| (a.0 - from).0 / length == (b.0 - from).0 / length) {
+        let by = |a: &&(Nanos, f64), b: &&(Nanos, f64)| a.1.total_cmp(&b.1);
+        let ends = [
+            group.first(),
+            group.iter().min_by(by),
+            group.iter().max_by(by),
+            group.last(),
+        ];
+        let mut ends: Vec<_> = ends.into_iter().flatten().copied().collect();
+        ends.sort_by_key(|(at, _)| *at);
+        ends.dedup_by_key(|(at, _)| *at);
+        thin.extend(ends);
+    }
+    thin
+}
+
+/// The ticks from a time to that in the name of the file, as a file.
+fn save(archive: &Archive, from: &str, file: &str) -> Option<Document> {
+    let (to, ending) = file.rsplit_once('.')?;
+    let span = (time(from)?, time(to)?);
+    let of = |format| {
+        let bytes = archive.history.file(format, span, LARGEST)?;
+        String::from_utf8(bytes).ok()
+    };
+    let (kind, text) = match ending {
+        "vcd" => ("text/plain; charset=utf-8", of(Format::Vcd)?),
+        "csv" => ("text/csv; charset=utf-8", of(Format::Csv)?),
+        "html" => (
+            "text/html; charset=utf-8",
+            report(archive, of(Format::Vcd)?)?,
+        ),
+        _ => return None,
+    };
+    Some(Document { kind, text })
+}
+
+/// The report of a recording.
+fn report(archive: &Archive, vcd: String) -> Option<String> {
+    let source = "recording of the live page";
+    let vcd = Box::new(Cursor::new(vcd.into_bytes()));
+    let mut recording = Recording::read(source, Format::Vcd, vcd, None).ok()?;
+    let (run, _) = tickbus_report::read(&mut recording, DEFAULT_BUDGET);
+    let contents = Contents {
+        title: &archive.history.columns().driver,
+        source,
+        run: &run,
+        steps: None,
+        faults: &[],
+        statistics: None,
+        texts: &[],
+        tables: &[],
+    };
+    let mut out = Vec::new();
+    tickbus_report::write(&contents, &mut out).ok()?;
+    String::from_utf8(out).ok()
+}

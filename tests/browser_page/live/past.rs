@@ -1,0 +1,209 @@
+//! The bar of time: the page shows a moment of the past, and the present goes on.
+
+use std::fmt::Write as _;
+
+use serde_json::{Value, json};
+
+use super::{Machine, TANK, choose, open, wait_shown};
+use crate::webdriver::{Browser, shoot};
+use crate::{assert_fits, assert_quiet, click, wait_said};
+
+const LEFT: &str = "\u{e012}";
+const RIGHT: &str = "\u{e014}";
+
+const PICTURE: &str = "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 200 80'>\
+    <rect x='20' y='10' width='30' height='60' fill='#4080c0' data-tb-height='Level: 0..500 -&gt; 0..1'/>\
+    <text id='told' x='70' y='45' font-size='20' data-tb-text='Level'>?</text></svg>";
+
+/// The text in the picture.
+const TOLD: &str = "pictures.all[0].root.querySelector('#told').textContent";
+
+/// What the row of the level shows.
+fn level(browser: &Browser) -> Value {
+    browser.run("return tickbusPage.value('Level')")
+}
+
+/// A tank with a picture, whose level went from 0 to 500 mm, and to 250 mm.
+fn filled() -> Machine {
+    let files = [("tank.svg", PICTURE)];
+    let machine = Machine::with("modbus-server", "picture = \"tank.svg\"", TANK, &files);
+    machine.write("4", "1", "0");
+    machine.write("4", "1", "27648");
+    machine.write("4", "1", "13824");
+    machine
+}
+
+#[test]
+fn the_page_steps_back_to_the_edge_while_the_present_goes_on() {
+    let machine = filled();
+    let browser = open(&machine, 1280, 800);
+    wait_shown(&browser, "Level", "250.00mm");
+    browser.wait(&format!("{TOLD} === '250.00 mm'"));
+    choose(&browser, "Level");
+    browser.run("list.toggle(list.chosen)");
+    browser.run("document.getElementById('more-time').open = true");
+    browser.run("document.getElementById('goal').value = 'signal'");
+    click(&browser, "#last-goal");
+    // The tick of the change has the new value, and the one before the old one: list and picture.
+    browser.wait("bar.moment && document.getElementById('link').textContent === 'paused'");
+    assert_eq!(level(&browser), 250);
+    let tick = browser
+        .run("return bar.moment.tick")
+        .as_u64()
+        .expect("a tick");
+    browser.run("document.getElementById('scrub').focus()");
+    browser.keys(LEFT);
+    browser.wait(&format!("bar.moment.tick === {}", tick - 1));
+    assert_eq!(level(&browser), 500);
+    wait_shown(&browser, "Level", "500.00mm");
+    browser.wait(&format!("{TOLD} === '500.00 mm'"));
+    // The present goes on underneath.
+    machine.write("4", "1", "5530");
+    browser.wait("plant.signals.find((it) => it.name === 'Level').live[0] < 101");
+    assert_eq!(level(&browser), 500);
+    browser.wait("/^Live: \\+/.test(document.getElementById('to-live').textContent)");
+    // Forcing would act on another moment than the one that is seen.
+    browser.run("document.getElementById('force-value').value = '1'; document.getElementById('chosen').requestSubmit()");
+    wait_said(&browser, "You look at the past");
+    shoot(&browser, None, "past", false);
+    browser.keys(RIGHT);
+    browser.wait(&format!("bar.moment.tick === {tick}"));
+    assert_eq!(level(&browser), 250);
+    // The trend has the exact edges.
+    let values = "plant.signals.find((it) => it.name === 'Level').trend.values";
+    browser.wait(&format!(
+        "{values}.filter((it) => !Number.isNaN(it)).length >= 3"
+    ));
+    let known = browser.run(&format!(
+        "return {values}.filter((it) => !Number.isNaN(it)).slice(0, 3)"
+    ));
+    assert_eq!(known, json!([0, 500, 250]));
+    click(&browser, "#to-live");
+    browser.wait("!bar.moment && document.getElementById('link').textContent === 'live'");
+    assert_eq!(browser.run("return tickbusPage.value('Level') < 101"), true);
+    assert_quiet(&browser);
+}
+
+#[test]
+fn an_outage_is_found_and_the_time_before_it_is_saved() {
+    let mut machine = Machine::rig();
+    let mut plc = machine.plc();
+    let browser = open(&machine, 1280, 900);
+    browser.wait("plant.signals.every((it) => !it.isStale)");
+    plc.kill();
+    browser.wait("plant.signals.some((it) => it.isStale)");
+    browser.run("document.getElementById('more-time').open = true");
+    click(&browser, "#last-goal");
+    browser.wait("bar.moment");
+    let stale = "plant.signals.filter((it) => it.direction === 'Q').every((it) => it.isStale)";
+    assert_eq!(browser.run(&format!("return {stale}")), true);
+    assert_eq!(
+        browser.run("return document.querySelector('.picture').classList.contains('is-stale')"),
+        true
+    );
+    browser.run("bar.step(-1)");
+    browser.wait(&format!("!({stale})"));
+    browser.wait("!document.querySelector('.picture').classList.contains('is-stale')");
+    browser.wait("document.querySelector('.driver .tag').textContent === 'running'");
+    browser.run("const real = URL.createObjectURL; URL.createObjectURL = (it) => { window.saved = it; return real(it); }");
+    for (ending, begin) in [
+        ("vcd", "$version tickbus"),
+        ("csv", "bus.tick,"),
+        ("html", "<!DOCTYPE html>"),
+    ] {
+        browser.run("window.saved = null");
+        click(&browser, &format!("#save [data-ending={ending}]"));
+        browser.wait("window.saved");
+        let text = browser.run("return (await window.saved.text()).slice(0, 40)");
+        assert!(
+            text.as_str().is_some_and(|text| text.starts_with(begin)),
+            "{text}"
+        );
+    }
+    wait_said(&browser, "Saved: ");
+    browser.run("document.getElementById('goal').value = 'fault'");
+    click(&browser, "#last-goal");
+    wait_said(&browser, "There is no earlier fault in the recorded time.");
+    assert_quiet(&browser);
+    // A restart begins another past.
+    machine.restart();
+    browser.wait("!bar.moment && document.getElementById('link').textContent === 'live'");
+}
+
+#[test]
+fn a_thousand_signals_are_scrubbed() {
+    let mut signals = String::new();
+    for n in 0..500 {
+        let _ = writeln!(
+            signals,
+            "[[signal]]\nname = \"In {n}\"\naddress = \"%IW{}\"\ntype = \"INT\"\n[[signal]]\nname = \"Out {n}\"\naddress = \"%QW{}\"\ntype = \"INT\"",
+            2 * n,
+            2 * n
+        );
+    }
+    let machine = Machine::new("modbus-server", "", &signals);
+    let browser = open(&machine, 1280, 800);
+    for value in 1..=8 {
+        for block in 0..5 {
+            let values = vec![value.to_string(); 100];
+            machine.write_all(&(100 * block).to_string(), &values);
+        }
+    }
+    browser.wait("tickbusPage.value('In 499') === 8");
+    // From one end of the bar to the other, twice, by as many moves as a hand makes.
+    browser.run(
+        "const range = document.getElementById('scrub'); bar.frames.length = 0; \
+         for (let i = 0; i <= 240; i++) { \
+           const at = Math.abs((i % 120) / 60 - 1); \
+           range.value = Number(range.min) + (range.max - range.min) * at; \
+           range.dispatchEvent(new Event('input')); \
+           await new Promise((go) => requestAnimationFrame(go)); }",
+    );
+    let figures = browser.run("const all = [...bar.frames].sort((a, b) => a - b); return [all.length, all[all.length >> 1], all[Math.floor(all.length * 0.99)], all.at(-1)]");
+    println!("scrubbing 1,000 signals: frames, p50, p99, longest in ms: {figures}");
+    assert!(figures[0].as_i64() > Some(20), "{figures}");
+    browser.run("bar.show(`at/${document.getElementById('scrub').min}`)");
+    browser.wait("tickbusPage.value('In 499') !== 8");
+    assert_quiet(&browser);
+}
+
+#[test]
+fn the_bar_fits_every_screen_in_the_light_and_in_the_dark() {
+    let machine = filled();
+    let shots = std::env::var_os("TICKBUS_SHOTS").map(std::path::PathBuf::from);
+    let browser = open(&machine, 1280, 800);
+    wait_shown(&browser, "Level", "250.00mm");
+    for scheme in ["light", "dark"] {
+        browser.devtools(
+            "Emulation.setEmulatedMedia",
+            &json!({"features": [{"name": "prefers-color-scheme", "value": scheme}]}),
+        );
+        for (width, height) in [(1440, 900), (390, 844)] {
+            browser.devtools(
+                "Emulation.setDeviceMetricsOverride",
+                &json!({"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 500}),
+            );
+            browser.run("bar.live()");
+            browser.run("if (!plant.signals[3].isOpen) list.toggle(plant.signals[3])");
+            browser.run("list.select(plant.signals[3])");
+            browser.wait("plant.signals[3].trend?.values.length >= 3");
+            browser.run("document.getElementById('more-time').open = false; for (let i = 0; i < 30; i++) await new Promise((go) => requestAnimationFrame(go))");
+            assert_fits(&browser);
+            shoot(
+                &browser,
+                shots.as_deref(),
+                &format!("live-{scheme}-{width}"),
+                false,
+            );
+            browser.run("document.getElementById('goal').value = 'signal'; document.getElementById('more-time').open = true; await bar.jump(false); bar.step(-1); for (let i = 0; i < 30; i++) await new Promise((go) => requestAnimationFrame(go))");
+            assert_fits(&browser);
+            shoot(
+                &browser,
+                shots.as_deref(),
+                &format!("past-{scheme}-{width}"),
+                false,
+            );
+        }
+    }
+    assert_quiet(&browser);
+}

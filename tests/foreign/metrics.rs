@@ -20,7 +20,8 @@ pub(crate) const TESTS: &[(&str, Test)] = &[
     ),
 ];
 
-const ALERTS: &str = "docs/grafana/alerts.yml";
+/// What only a simulation has; the mirror of this test scans as a program does.
+const OF_TICKS: [&str; 2] = ["tickbus_exchanges_total", "tickbus_exchange_seconds"];
 
 /// A program with text on its standard input; it must succeed. Returns its output.
 fn filter(mut command: Command, text: &str) -> String {
@@ -63,13 +64,13 @@ fn client_reads() -> Result<(), Absent> {
     let has = |line: &str| assert!(read.lines().any(|it| it == line), "no {line:?} in\n{read}");
     let level = "driver=Tank id=4711 signal=Level \"left\"";
     has(&format!(
-        "gauge\ttickbus_signal_value\t{level} unit=mm\t125.0"
+        "gauge\ttickbus_signal_value\t{level} unit=mm\t125"
     ));
-    has(&format!("gauge\ttickbus_signal_forced\t{level}\t1.0"));
-    has("counter\ttickbus_signal_edges_total\tdriver=Tank id=4711 signal=Valve\t0.0");
-    has("gauge\ttickbus_line_state\tdriver=Tank id=4711 state=opening\t1.0");
-    has("counter\ttickbus_faults_begun_total\tdriver=Tank id=4711\t1.0");
-    has("histogram\ttickbus_bus_cycle_seconds_bucket\tdriver=Tank id=4711 le=0.001\t0.0");
+    has(&format!("gauge\ttickbus_signal_forced\t{level}\t1"));
+    has("counter\ttickbus_signal_edges_total\tdriver=Tank id=4711 signal=Valve\t0");
+    has("gauge\ttickbus_line_state\tdriver=Tank id=4711 state=opening\t1");
+    has("counter\ttickbus_faults_begun_total\tdriver=Tank id=4711\t1");
+    has("histogram\ttickbus_bus_cycle_seconds_bucket\tdriver=Tank id=4711 le=0.001\t0");
     Ok(())
 }
 
@@ -198,6 +199,11 @@ fn prometheus() -> Result<(), Absent> {
     plc.write_all(&[1]).expect("it reads");
     machine.command.after("mirror: running: ");
     for query in dashboard() {
+        if OF_TICKS.iter().any(|metric| query.contains(metric)) {
+            // A query with a mistake fails.
+            prometheus.query(&query);
+            continue;
+        }
         eventually(&query, || {
             plc.write_all(&[1]).expect("it reads");
             !prometheus.query(&query).is_empty()

@@ -17,6 +17,7 @@ mod live;
 mod run;
 mod studio;
 mod taken;
+mod studio_tags;
 
 use std::io::{BufRead as _, BufReader, Lines, Write as _};
 use std::net::TcpStream;

@@ -10,21 +10,21 @@ use serde_json::{Value, json};
 use crate::webdriver::{Browser, shoot};
 use crate::{assert_fits, assert_quiet, click, find};
 
-const ENTER: &str = "\u{e007}";
+pub(crate) const ENTER: &str = "\u{e007}";
 const TAB: &str = "\u{e004}";
 const DELETE: &str = "\u{e017}";
 const CONTROL: &str = "\u{e009}";
 
 /// A studio as a process.
-struct Studio {
+pub(crate) struct Studio {
     child: Child,
     url: String,
-    folder: tempfile::TempDir,
+    pub(crate) folder: tempfile::TempDir,
 }
 
 impl Studio {
     /// Opens the studio on a file with this text; without one, on a file that is not there.
-    fn new(text: Option<&str>) -> Self {
+    pub(crate) fn new(text: Option<&str>) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let file = folder.path().join("driver.cfg");
         if let Some(text) = text {
@@ -47,11 +47,11 @@ impl Studio {
         }
     }
 
-    fn file(&self) -> PathBuf {
+    pub(crate) fn file(&self) -> PathBuf {
         self.folder.path().join("driver.cfg")
     }
 
-    fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         fs::read_to_string(self.file()).expect("it is there")
     }
 }
@@ -63,7 +63,7 @@ impl Drop for Studio {
     }
 }
 
-fn open(studio: &Studio, width: u32, height: u32) -> Browser {
+pub(crate) fn open(studio: &Studio, width: u32, height: u32) -> Browser {
     let browser = Browser::start(width, height);
     browser.go(&studio.url);
     browser.wait(READY);
@@ -74,7 +74,7 @@ fn open(studio: &Studio, width: u32, height: u32) -> Browser {
 pub(crate) const READY: &str = "document.querySelector('#settings select') !== null";
 
 /// Types into a cell, by keys alone.
-fn fill(browser: &Browser, row: usize, key: &str, text: &str) {
+pub(crate) fn fill(browser: &Browser, row: usize, key: &str, text: &str) {
     browser.run(&format!("cells.go({row}, {})", json!(key)));
     browser.keys(&format!("{ENTER}{text}{ENTER}"));
     wait_cell(browser, row, key, text);

@@ -8,7 +8,9 @@ use tickbus_base::toml_text::{Collector, Key, Table, shown};
 use tickbus_fieldbus::examine::{Complaint, Examination, Search};
 use tickbus_fieldbus::faults::AnswerCodes;
 use tickbus_fieldbus::tcp::Writers;
-use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, NamedFile, OpenError, Role};
+use tickbus_fieldbus::{
+    At, Browsing, Bus, BusKind, BusOptions, BusSetup, NamedFile, OpenError, Role,
+};
 use tickbus_image::signal::{Signal, SignalTable};
 
 use super::codes::CODES;
@@ -19,6 +21,7 @@ use super::{ClientOptions, ServerOptions, keys, options, search, security};
 impl BusKind for ClientOptions {
     const NAME: &'static str = "opcua-client";
     const CAN_OBSERVE: bool = true;
+    const BROWSES: bool = true;
     const SEARCH: Option<Search> = Some(search::SEARCH);
     const KEYS: &'static [&'static [Key]] = &[keys::CLIENT, security::KEYS];
 
@@ -79,6 +82,27 @@ impl BusOptions for ClientOptions {
         };
         if hello::says_hello(examination, &mut wire, &self.url) {
             examination.unexamined("OPC UA, which is not in this build,");
+        }
+    }
+
+    #[cfg(feature = "opcua")]
+    fn browse(
+        &self,
+        examination: &mut Examination<'_>,
+        browsing: &mut dyn Browsing,
+    ) -> Result<(), String> {
+        super::client::browse(self, examination, browsing)
+    }
+
+    #[cfg(not(feature = "opcua"))]
+    fn browse(
+        &self,
+        _examination: &mut Examination<'_>,
+        _browsing: &mut dyn Browsing,
+    ) -> Result<(), String> {
+        match not_in_this_build(Self::NAME) {
+            OpenError::Unsupported(why) => Err(why),
+            OpenError::Config(mistake) => Err(mistake.to_string()),
         }
     }
 }

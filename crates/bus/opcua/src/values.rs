@@ -21,6 +21,32 @@ pub(super) fn scalar(data_type: DataType) -> VariantScalarTypeId {
     }
 }
 
+/// The types of signals, one for each type of OPC UA that a signal can have.
+const TYPES: [DataType; 11] = [
+    DataType::Bool,
+    DataType::Sint,
+    DataType::Usint,
+    DataType::Int,
+    DataType::Uint,
+    DataType::Dint,
+    DataType::Udint,
+    DataType::Real,
+    DataType::Lint,
+    DataType::Ulint,
+    DataType::Lreal,
+];
+
+/// The data type of an OPC UA type; `None` if no signal can have it.
+pub(super) fn of_scalar(theirs: VariantScalarTypeId) -> Option<DataType> {
+    TYPES.into_iter().find(|own| scalar(*own) == theirs)
+}
+
+/// The data type of values that the node `theirs` describes; `None` if no signal can have it, or if the values have types
+/// of their own.
+pub(super) fn of_data_type_id(theirs: DataTypeId) -> Option<DataType> {
+    TYPES.into_iter().find(|own| data_type_id(*own) == theirs)
+}
+
 /// The node that describes a type.
 pub(super) fn data_type_id(data_type: DataType) -> DataTypeId {
     match scalar(data_type) {

@@ -11,6 +11,8 @@ pub struct KindKeys {
     pub learns_of_writes: bool,
     /// True if `role` can be `"observer"`.
     pub can_observe: bool,
+    /// True if the tags of the peer can be browsed.
+    pub browses: bool,
     /// The keys in `[fieldbus]`, in groups.
     pub keys: &'static [&'static [Key]],
     /// Those of which a file has at least one; empty if it can be without all of them.

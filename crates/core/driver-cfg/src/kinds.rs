@@ -30,6 +30,7 @@ impl Kind {
                 name: K::NAME,
                 learns_of_writes: K::LEARNS_OF_WRITES,
                 can_observe: K::CAN_OBSERVE,
+                browses: K::BROWSES,
                 keys: K::KEYS,
                 one_of: K::ONE_OF,
                 station_keys: K::STATION_KEYS,

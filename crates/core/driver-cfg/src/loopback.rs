@@ -94,6 +94,7 @@ pub(super) const KIND_KEYS: KindKeys = KindKeys {
     name: NAME,
     learns_of_writes: false,
     can_observe: false,
+    browses: false,
     keys: &[KEYS],
     one_of: &ONE_OF,
     station_keys: &[],

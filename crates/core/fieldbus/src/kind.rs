@@ -12,7 +12,7 @@ use tickbus_image::signal::{Signal, SignalTable};
 
 use super::examine::{Complaint, Examination, Search};
 use super::faults::AnswerCodes;
-use super::{At, Bus, BusSetup, Role};
+use super::{At, Browsing, Bus, BusSetup, Role};
 
 /// The reason why a bus does not open.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -181,6 +181,21 @@ pub trait BusOptions: AnyOptions {
         examination.unexamined("a line of this kind");
     }
 
+    /// Connects as the options say, and shows the tags of the peer to `browsing` until it has enough; for the buses that
+    /// [can](BusKind::BROWSES). Writes nothing. The steps of the examination show how far it came.
+    ///
+    /// # Errors
+    ///
+    /// There is no connection, or no longer; with the remedy.
+    fn browse(
+        &self,
+        examination: &mut Examination<'_>,
+        browsing: &mut dyn Browsing,
+    ) -> Result<(), String> {
+        let _ = (examination, browsing);
+        Err("a peer on this bus does not list its tags; import the list of its editor".to_owned())
+    }
+
     /// The counters that show what the clients of a server do wrong; `None` for a bus that is no server.
     fn complaints(&self) -> Option<&'static [Complaint]> {
         None
@@ -205,6 +220,9 @@ pub trait BusKind: BusOptions + Sized {
     /// True if an end of this bus can be an [observer](Role::Observer): it then places a signal by its [address in the
     /// PLC](Signal::plc_address).
     const CAN_OBSERVE: bool = false;
+
+    /// True if the bus can [browse](BusOptions::browse) the tags of its peer.
+    const BROWSES: bool = false;
 
     /// The keys that [`read`](Self::read) takes, in groups that kinds can share: for the schema of a driver.cfg.
     const KEYS: &'static [&'static [Key]];

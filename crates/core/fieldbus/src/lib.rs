@@ -3,6 +3,7 @@
 mod alive;
 mod at;
 mod bits;
+mod browse;
 mod bus;
 mod card;
 mod changes;
@@ -32,6 +33,7 @@ pub mod tcp;
 pub use alive::{Alive, Heartbeat, LifeSigns, Watch, Written};
 pub use at::{ADDRESS_LIMIT, At, both_ways};
 pub use bits::{copy_bits, take_bits};
+pub use browse::{Browsing, Listing, Place, Tag, Wanted};
 pub use bus::{Bus, CYCLE, Free, Lead, Stepped};
 pub use card::{Card, CardBus, CardOptions, Failing, Meaning, Moved, Vendor, Verdict};
 pub use changes::ChangeEvents;

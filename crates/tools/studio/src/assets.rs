@@ -38,6 +38,11 @@ const OWN: &[Asset] = &[
         text: include_str!("explore.js"),
     },
     Asset {
+        path: "/tags.js",
+        kind: SCRIPT,
+        text: include_str!("tags.js"),
+    },
+    Asset {
         path: "/bus.js",
         kind: SCRIPT,
         text: include_str!("bus.js"),

@@ -159,6 +159,8 @@ const cells = (() => {
         cell.title = wrong;
         cell.setAttribute("aria-invalid", "true");
       }
+      // A node is longer than its column.
+      if (!wrong && key === "at") cell.title = text(index, key);
       const isChosen = at === row && place === column;
       cell.setAttribute("aria-selected", String(isChosen));
       if (isChosen) element.classList.add("chosen");
@@ -281,6 +283,10 @@ const cells = (() => {
       }
       choose(shown.indexOf(index), Math.max(0, columns.findIndex((it) => it.key === key)));
       get("grid").focus({ preventScroll: true });
+    },
+    /** Chooses a signal without taking the focus. */
+    reveal(index) {
+      if (shown.includes(index)) choose(shown.indexOf(index), column);
     },
     edit,
     leave,

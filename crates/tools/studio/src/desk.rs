@@ -10,9 +10,10 @@ use tickbus_driver_cfg::{Kinds, keys};
 
 use crate::check::{Checked, check};
 use crate::document::body;
-use crate::edit::{Edit, Shapes, Unmade, adopt, make};
+use crate::edit::{Edit, Made, Shapes, Unmade, adopt, make};
 use crate::file::{OnDisk, Unwritten};
 use crate::history::History;
+use crate::news::News;
 use crate::sheet::Sheet;
 use crate::tags;
 
@@ -35,7 +36,13 @@ pub(crate) struct Desk {
     unsaved: Option<String>,
     /// The sentence of the page about the last change that nobody here made, or that was more than a cell.
     told: String,
+    /// How often the file was missed, one look after the other.
+    missed: u8,
+    news: News,
 }
+
+/// A file that is missed this often is gone: editors replace files in two steps.
+const GONE: u8 = 2;
 
 /// Why a request was refused, with the status of HTTP.
 pub(crate) type Refusal = (u16, String);
@@ -64,6 +71,8 @@ impl Desk {
             checked: Checked::default(),
             unsaved: None,
             told: String::new(),
+            missed: 0,
+            news: News::default(),
         };
         desk.check();
         Ok(desk)
@@ -71,6 +80,11 @@ impl Desk {
 
     pub(crate) fn path(&self) -> &Path {
         self.disk.path()
+    }
+
+    /// The text with all edits.
+    pub(crate) fn text(&self) -> &str {
+        &self.text
     }
 
     /// The number of the present state.
@@ -91,9 +105,23 @@ impl Desk {
 
     /// Reads the file again if another program has changed it.
     pub(crate) fn look(&mut self) {
+        let was_gone = self.is_gone();
+        self.missed = if self.disk.is_missing() {
+            self.missed.saturating_add(1).min(GONE)
+        } else {
+            0
+        };
+        if self.is_gone() != was_gone {
+            self.version += 1;
+        }
         if let Some(theirs) = self.disk.look() {
             self.take_theirs(theirs);
         }
+    }
+
+    /// True if the file was there, and is not any more.
+    fn is_gone(&self) -> bool {
+        self.missed >= GONE
     }
 
     fn take_theirs(&mut self, theirs: String) {
@@ -123,11 +151,15 @@ impl Desk {
             let text = "the file was changed meanwhile; your text is still in the field: compare, and apply it again";
             return Err((409, text.to_owned()));
         }
-        let (text, done) = make(&self.text, edit, self).map_err(|unmade| match unmade {
-            Unmade::Conflict(text) => (409, text),
-            Unmade::Impossible(text) => (400, text),
-        })?;
-        self.told.clear();
+        let Made { text, done, told } =
+            make(&self.text, edit, self).map_err(|unmade| match unmade {
+                Unmade::Conflict(text) => (409, text),
+                Unmade::Impossible(text) => (400, text),
+            })?;
+        if told != self.told {
+            self.told = told;
+            self.version += 1;
+        }
         self.change(text.into(), done);
         Ok(())
     }
@@ -210,6 +242,7 @@ impl Desk {
     pub(crate) fn save(&mut self) {
         match self.disk.write(&self.text) {
             Ok(()) => {
+                self.missed = 0;
                 if self.unsaved.take().is_some() {
                     self.version += 1;
                 }
@@ -256,6 +289,13 @@ impl Desk {
         self.checked.notes.extend(hidden(&self.text));
     }
 
+    /// All that the page shows of the file; of its large parts what has changed since the state with the number `seen`.
+    pub(crate) fn news(&mut self, seen: Option<u64>) -> Json {
+        let mut state = self.json();
+        self.news.since(seen, self.version, &mut state);
+        state
+    }
+
     /// All that the page shows of the file.
     pub(crate) fn json(&self) -> Json {
         let path = self.disk.path();
@@ -265,17 +305,21 @@ impl Desk {
             Err(why) => (None, Some(why)),
         };
         let name = path.file_name().unwrap_or_default();
+        let kind = sheet.as_ref().map_or("", Sheet::kind);
+        let browses = (self.kinds.keys().iter()).any(|it| it.browses && it.name == kind);
         json!({
             "version": self.version,
             "path": path.display().to_string(),
             "name": name.to_string_lossy(),
             "unsaved": self.unsaved,
+            "isGone": self.is_gone(),
             "told": self.told,
             "undo": self.history.undoes(),
             "redo": self.history.redoes(),
             "sheet": sheet,
             "broken": broken,
             "checked": self.checked,
+            "browses": browses,
             "diff": diff(&self.first, &self.text),
             "text": &*self.text,
         })

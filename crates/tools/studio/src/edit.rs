@@ -8,6 +8,8 @@ use crate::document::{parsed, written};
 use crate::layout;
 use crate::literal::{cell, literal, shape_of};
 use crate::places::{Step, Way};
+use crate::rename::{follow, name_of};
+use crate::take::{Taken, take};
 
 /// One change of the file.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
@@ -42,8 +44,25 @@ pub(crate) enum Edit {
         was: String,
         to: usize,
     },
+    /// Signals for tags of the PLC, behind the first `index` signals, each with its address in the device.
+    Take {
+        tags: Vec<Taken>,
+        index: usize,
+        #[serde(default)]
+        station: String,
+    },
     /// The whole text is replaced. `was` is the number of the version that the editor saw.
     Text { was: u64, to: String },
+}
+
+/// A text that an edit has made.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Made {
+    pub(crate) text: String,
+    /// What was done, in words.
+    pub(crate) done: String,
+    /// What the editor does not see in the cell that it edits; can be empty.
+    pub(crate) told: String,
 }
 
 /// Why an edit was not made.
@@ -61,32 +80,33 @@ pub(crate) trait Shapes {
     fn keys(&self, table: &str, kind: &str) -> Vec<&'static Key>;
 }
 
-/// Makes an edit in a text. Returns the new text, and what was done, in words.
-pub(crate) fn make(
-    text: &str,
-    edit: &Edit,
-    shapes: &dyn Shapes,
-) -> Result<(String, String), Unmade> {
+/// Makes an edit in a text.
+pub(crate) fn make(text: &str, edit: &Edit, shapes: &dyn Shapes) -> Result<Made, Unmade> {
     // This is how a text that is no TOML gets mended.
     if let Edit::Text { to, .. } = edit {
-        return Ok((
-            layout::ends_as(text, to.clone()),
-            "edited the text".to_owned(),
-        ));
+        return Ok(Made {
+            text: layout::ends_as(text, to.clone()),
+            done: "edited the text".to_owned(),
+            told: String::new(),
+        });
     }
+    let mut told = String::new();
     let mut document = parsed(text).map_err(Unmade::Impossible)?;
-    let told = match edit {
+    let done = match edit {
         Edit::Set { at, was, to, of } => {
             if let (Some(of), [Step::Key(list), Step::Index(index), ..]) = (of, &at[..]) {
                 find(list_mut(&mut document, list)?, list, *index, of)?;
             }
-            let told = set(&mut document, at, was, to, shapes)?;
+            let mut done = set(&mut document, at, was, to, shapes)?;
             if let [Step::Key(list), Step::Index(_), Step::Key(key)] = &at[..]
                 && (list.as_str(), key.as_str()) == ("signal", "name")
             {
-                follow(&mut document, was, to.trim());
+                told = follow(&mut document, was, to.trim());
+                if !told.is_empty() {
+                    done = format!("{done}; {told}");
+                }
             }
-            told
+            done
         }
         Edit::Add { list, index, cells } => add(&mut document, list, *index, cells, shapes)?,
         Edit::Remove { list, index, was } => {
@@ -106,9 +126,21 @@ pub(crate) fn make(
             shift(tables, *index, *to);
             format!("moved {list} {}", quoted(was))
         }
+        Edit::Take {
+            tags,
+            index,
+            station,
+        } => {
+            told = take(&mut document, tags, *index, station)?;
+            told.clone()
+        }
         Edit::Text { .. } => String::new(),
     };
-    Ok((written(text, &document), told))
+    Ok(Made {
+        text: written(text, &document),
+        done,
+        told,
+    })
 }
 
 /// Puts the keys of a `[fieldbus]` table, which is a text of TOML, into that of a file. Returns the new text, and what was
@@ -195,48 +227,6 @@ fn set(
     Ok(format!("{label}: {name} {}", quoted(to.trim())))
 }
 
-/// The place in the device follows the name of its signal, if no other has either name.
-fn follow(document: &mut DocumentMut, was: &str, to: &str) {
-    let signals = document.get("signal").and_then(Item::as_array_of_tables);
-    let has_was = |table: &Table| name_of(table) == was;
-    if to.is_empty() || signals.is_some_and(|signals| signals.iter().any(has_was)) {
-        return;
-    }
-    let at = document
-        .get_mut("fieldbus")
-        .and_then(|table| table.get_mut("at"));
-    let Some(Item::Table(table)) = at else {
-        return;
-    };
-    if table.contains_key(to) || !table.contains_key(was) {
-        return;
-    }
-    let mut renamed = table.clone();
-    renamed.clear();
-    for (name, _) in table.iter() {
-        let Some((key, item)) = table.get_key_value(name) else {
-            continue;
-        };
-        let mut key = key.clone();
-        if name == was {
-            // The column of the equal sign stays, as far as the new name leaves room for it.
-            let before = key.display_repr().chars().count();
-            let mut new = toml_edit::Key::new(to).with_leaf_decor(key.leaf_decor().clone());
-            let blanks = key.leaf_decor().suffix().and_then(|it| it.as_str());
-            let end = before + blanks.unwrap_or(" ").chars().count();
-            let blanks = end.saturating_sub(new.display_repr().chars().count());
-            new.leaf_decor_mut().set_suffix(" ".repeat(blanks.max(1)));
-            key = new;
-        }
-        renamed.insert_formatted(&key, item.clone());
-    }
-    *table = renamed;
-}
-
-fn name_of(table: &Table) -> String {
-    table.get("name").map(cell).unwrap_or_default()
-}
-
 /// The subject of an edit: the name of the signal, or the table.
 fn label(way: &[Step], table: &dyn TableLike, key: &str) -> String {
     let name = table.get("name").map(cell).filter(|_| key != "name");
@@ -261,7 +251,7 @@ pub(crate) fn kind(document: &DocumentMut) -> String {
 }
 
 /// The table at the end of this way; tables that are missing are added.
-fn table_at<'d>(
+pub(crate) fn table_at<'d>(
     document: &'d mut DocumentMut,
     way: &[Step],
 ) -> Result<&'d mut dyn TableLike, Unmade> {
@@ -290,7 +280,7 @@ fn table_at<'d>(
     Ok(table)
 }
 
-fn list_mut<'d>(
+pub(crate) fn list_mut<'d>(
     document: &'d mut DocumentMut,
     list: &str,
 ) -> Result<&'d mut ArrayOfTables, Unmade> {
@@ -343,6 +333,21 @@ fn add(
     let last = tables.len() - 1;
     shift(tables, last, index);
     Ok(format!("added {list} {}", quoted(name)))
+}
+
+/// Puts new tables into a list, behind the first `index`.
+pub(crate) fn splice(tables: &mut ArrayOfTables, index: usize, mut new: Vec<Table>) {
+    let mut all: Vec<Table> = std::mem::take(tables).into_iter().collect();
+    let index = index.min(all.len());
+    if index == 0 {
+        // Ahead of the next: another table may be last in the text, such as [fieldbus.at].
+        let first = all.first().and_then(Table::position);
+        for table in &mut new {
+            table.set_position(first);
+        }
+    }
+    all.splice(index..index, new);
+    *tables = all.into_iter().collect();
 }
 
 /// Takes a table to another place of its list, with all that is in it.

@@ -52,6 +52,11 @@ impl OnDisk {
         &self.known
     }
 
+    /// True if there was a file, and is none at the moment.
+    pub(crate) fn is_missing(&self) -> bool {
+        self.seen.is_some() && !self.path.exists()
+    }
+
     /// The new text if another program has changed the file; it is then known. A file that cannot be read at the moment
     /// counts as unchanged, because editors replace files in two steps.
     pub(crate) fn look(&mut self) -> Option<String> {

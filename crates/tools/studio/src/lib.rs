@@ -6,6 +6,7 @@
 
 mod assets;
 mod beside;
+mod browse;
 mod check;
 mod desk;
 mod document;
@@ -16,12 +17,15 @@ mod history;
 mod layout;
 mod line;
 mod literal;
+mod news;
 mod places;
 mod propose;
 mod running;
+mod rename;
 mod sheet;
 mod site;
 mod tags;
+mod take;
 
 #[cfg(test)]
 mod running_tests;

@@ -21,6 +21,15 @@ const WIDTHS: [Width; 5] = [
 /// signals that name none is "".
 pub(crate) fn next(document: &DocumentMut) -> BTreeMap<String, BTreeMap<String, String>> {
     let unit = addressing(document);
+    ends(document)
+        .into_iter()
+        .map(|(station, ends)| (station, proposed(ends, unit)))
+        .collect()
+}
+
+/// The bits behind the last address of each of [`AREAS`], by station.
+fn ends(document: &DocumentMut) -> BTreeMap<String, [usize; 2]> {
+    let unit = addressing(document);
     let none = ArrayOfTables::new();
     let signals = document
         .get("signal")
@@ -37,9 +46,35 @@ pub(crate) fn next(document: &DocumentMut) -> BTreeMap<String, BTreeMap<String, 
             }
         }
     }
-    ends.into_iter()
-        .map(|(station, ends)| (station, proposed(ends, unit)))
-        .collect()
+    ends
+}
+
+/// Free addresses of a station, one after the other.
+#[derive(Debug)]
+pub(crate) struct Free {
+    ends: [usize; 2],
+    unit: Addressing,
+}
+
+impl Free {
+    /// Those behind all addresses of a station, or of the signals that name none.
+    pub(crate) fn of(document: &DocumentMut, station: &str) -> Self {
+        Self {
+            ends: ends(document).remove(station).unwrap_or_default(),
+            unit: addressing(document),
+        }
+    }
+
+    /// The next address of this area and size.
+    pub(crate) fn take(&mut self, area: Area, width: Width) -> String {
+        let place = AREAS.iter().position(|known| *known == area);
+        let Some(end) = place.and_then(|place| self.ends.get_mut(place)) else {
+            return String::new();
+        };
+        let text = free(area, width, *end, self.unit);
+        *end = end.div_ceil(width.bits()) * width.bits() + width.bits();
+        text
+    }
 }
 
 /// The free addresses behind these bits of [`AREAS`].

@@ -42,6 +42,11 @@ impl Sheet {
         Ok(Self::read(&document.into_mut()))
     }
 
+    /// The kind of bus; empty without one.
+    pub(crate) fn kind(&self) -> &str {
+        &self.kind
+    }
+
     fn read(document: &DocumentMut) -> Self {
         let cells = |name: &str| document.get(name).map(cells_of).unwrap_or_default();
         let mut fieldbus = cells("fieldbus");

@@ -12,6 +12,7 @@ use tickbus_live_page::LivePage;
 use tickbus_web::{Answer, Asset, Change, Document, Outcome, Refused, Site, State, Verb};
 
 use crate::assets::assets;
+use crate::browse::{Tags, settings};
 use crate::desk::{Desk, Refusal};
 use crate::edit::Edit;
 use crate::explore::{Explored, Question, look_along, search};
@@ -61,6 +62,7 @@ struct Shared {
     kinds: &'static Kinds,
     owner: Owner,
     live: Arc<dyn Site>,
+    tags: Arc<Tags>,
     state: Mutex<Room>,
 }
 
@@ -143,6 +145,7 @@ impl Studio {
             kinds,
             owner,
             live,
+            tags: Arc::default(),
             state: Mutex::new(room),
         })))
     }
@@ -180,6 +183,7 @@ impl Studio {
 
     /// Stops the line. Returns what could not be written into the file; it is then kept in another one.
     pub fn close(self) -> Option<Unsaved> {
+        self.0.tags.close();
         let mut room = self.0.room();
         room.line = None;
         let (text, why) = room.desk.settle()?;
@@ -315,7 +319,10 @@ impl Shared {
         if seen == version {
             return json!({ "state": version }).to_string();
         }
-        let mut state = room.desk.json();
+        let before = seen
+            .split_once('.')
+            .and_then(|(version, _)| version.parse().ok());
+        let mut state = room.desk.news(before);
         state["state"] = json!(version);
         state["explored"] = room.explored.json();
         state["line"] = match &self.owner {
@@ -335,6 +342,24 @@ impl Shared {
             }
         };
         state.to_string()
+    }
+
+    /// What is in a folder of the PLC's tags.
+    fn tags(&self, id: &str) -> String {
+        let (path, settings) = {
+            let mut room = self.room();
+            room.desk.look();
+            (room.desk.path().to_owned(), settings(room.desk.text()))
+        };
+        let found = match settings {
+            Ok(settings) => self.tags.open(id, &settings, &path, self.kinds),
+            Err(why) => Some(Err(why)),
+        };
+        match found {
+            Some(Ok(listing)) => listing.to_string(),
+            Some(Err(why)) => json!({ "error": why }).to_string(),
+            None => json!({ "waits": true }).to_string(),
+        }
     }
 
     fn change(&self, change: &Change) -> Result<(), Refusal> {
@@ -365,6 +390,10 @@ impl Shared {
             }
             ("cancel", _) => {
                 self.room().explored.cancel();
+                Ok(())
+            }
+            ("tags", "close") => {
+                self.tags.close();
                 Ok(())
             }
             ("line", "start") => self.start(),
@@ -484,6 +513,9 @@ impl Site for StudioSite {
                 { "path": "/studio", "name": "Studio" },
             ]);
             answer.give(json(tabs.to_string()));
+        } else if let Some(id) = path.strip_prefix("/studio/tags/") {
+            let id = decoded(id);
+            self.apart(answer, move |shared| json(shared.tags(&id)));
         } else if path == "/studio/schema" {
             self.apart(answer, move |shared| {
                 json(tickbus_schema::schema(shared.kinds).to_string())

@@ -48,17 +48,32 @@
     }
   }
 
-  function take(state) {
+  /** Puts a state together from the last one and what has changed since. */
+  function whole(state) {
+    const { since } = state;
+    if (!since) return state;
+    const { signals, at } = file.sheet;
+    const { rows, text } = since;
+    state.sheet.signals = [...signals.slice(0, rows.from), ...rows.new, ...signals.slice(rows.from + rows.gone)];
+    state.sheet.at = { ...at, ...since.at.set };
+    for (const name of since.at.gone) delete state.sheet.at[name];
+    state.text = file.text.slice(0, text.from) + text.new + file.text.slice(text.from + text.gone);
+    return state;
+  }
+
+  function take(news) {
+    const state = whole(news);
     file = state;
     seen = state.state;
     document.title = `${state.name} – tickbus studio`;
     get("title").textContent = state.name;
     get("path").textContent = state.path;
     const isSaved = state.unsaved === null;
-    get("saved").textContent = isSaved ? "saved" : "not saved";
-    get("saved").className = isSaved ? "tag good" : "tag bad";
+    get("saved").textContent = state.isGone ? "gone" : isSaved ? "saved" : "not saved";
+    get("saved").className = isSaved && !state.isGone ? "tag good" : "tag bad";
     get("saved").title = state.unsaved ?? "Every edit is written into the file at once";
-    if (!isSaved) say(`The file cannot be written: ${state.unsaved}. The edits are kept here, and written as soon as that works.`, true);
+    if (isSaved && state.isGone) say(`${state.name} is gone; the next edit writes it again.`, true);
+    else if (!isSaved) say(`The file cannot be written: ${state.unsaved}. The edits are kept here, and written as soon as that works.`, true);
     else if (state.told) say(state.told);
     else say("");
     for (const [id, done] of [["undo", state.undo], ["redo", state.redo]]) {
@@ -66,6 +81,7 @@
       get(id).title = done ?? "";
     }
     const checked = state.checked.mistakes;
+    tags.show(state);
     if (state.sheet) {
       bus.show(state.sheet, checked);
       cells.show(state.sheet, checked);
@@ -249,22 +265,59 @@
     await edit({ move: { list: "signal", index, was: signals[index].name ?? "", to } });
   }
 
+  /** Reads lists of tags one after the other, and says of each what came of it. */
+  async function takeFiles(given) {
+    const told = [];
+    let isBad = false;
+    for (const list of [...given]) {
+      const isDone = await takeFile(list);
+      isBad ||= !isDone;
+      told.push(get("told").textContent);
+    }
+    if (told.length > 1) say(told.join("\n"), isBad);
+  }
+
+  /** Gives a signal the address of a tag. */
+  async function give(index, tag) {
+    const signal = file?.sheet?.signals[index];
+    if (!signal?.name) return refuse("Name the signal first: its place in the device goes by that.");
+    const { name } = signal;
+    const was = Object.hasOwn(file.sheet.at, name) ? file.sheet.at[name] : "";
+    if (!await set(["fieldbus", "at", name], was, tag.at)) return;
+    const own = signal.type ?? { X: "BOOL", B: "BYTE", W: "WORD", D: "DWORD", L: "LWORD" }[signal.address?.[2]?.toUpperCase()];
+    const alike = { BYTE: "USINT", WORD: "UINT", DWORD: "UDINT", LWORD: "ULINT" };
+    const differs = own && (alike[own] ?? own) !== (alike[tag.dataType] ?? tag.dataType);
+    say(`${name} is ${tag.at} now.${differs ? ` The tag is ${tag.dataType}, and the signal ${own}: correct its type and address.` : ""}`);
+  }
+
+  /** Adds signals for tags. */
+  async function takeTags(list) {
+    const signals = file?.sheet?.signals ?? [];
+    const station = signals[cells.chosen]?.station ?? signals.at(-1)?.station ?? "";
+    const isDone = await edit({ take: { tags: list, index: signals.length, station } });
+    if (isDone) cells.reveal(file.sheet.signals.length - 1);
+    return isDone;
+  }
+
   async function takeFile(given) {
-    if (!given) return;
     const bytes = new Uint8Array(await given.arrayBuffer());
     let text = "";
     for (let at = 0; at < bytes.length; at += 0x8000) text += String.fromCharCode(...bytes.subarray(at, at + 0x8000));
-    await change(`import/${encodeURIComponent(given.name)}`, btoa(text));
+    return change(`import/${encodeURIComponent(given.name)}`, btoa(text));
   }
 
   cells.begin({
     set: setCell,
-    chosen: (text) => { get("cell-told").textContent = text; },
+    chosen: (text) => {
+      get("cell-told").textContent = text;
+      tags.choose(file?.sheet?.signals[cells.chosen]?.name);
+    },
     mayEdit: () => mayEdit,
     hasPlaces: () => file?.checked.hasPlaces !== false || Object.keys(file.sheet.at).length > 0,
   });
 
   explore.begin(change);
+  tags.begin({ take: takeTags, give, mayEdit: () => mayEdit, chosen: () => cells.chosen, leave: () => change("tags", "close") });
   get("undo").addEventListener("click", () => change("undo"));
   get("redo").addEventListener("click", () => change("redo"));
   get("start").addEventListener("click", () => change("line", "start"));
@@ -292,10 +345,11 @@
   });
   get("import").addEventListener("click", () => get("import-file").click());
   get("import-file").addEventListener("change", async () => {
-    await takeFile(get("import-file").files[0]);
+    await takeFiles(get("import-file").files);
     get("import-file").value = "";
   });
   window.addEventListener("dragover", (event) => {
+    if (!event.dataTransfer?.types.includes("Files")) return;
     event.preventDefault();
     document.body.classList.add("is-dropping");
   });
@@ -303,7 +357,7 @@
   window.addEventListener("drop", (event) => {
     event.preventDefault();
     document.body.classList.remove("is-dropping");
-    takeFile(event.dataTransfer?.files[0]);
+    takeFiles(event.dataTransfer?.files ?? []);
   });
   window.addEventListener("keydown", (event) => {
     const isTyping = event.target.matches?.("input, textarea");

@@ -1,5 +1,7 @@
 //! Edits of texts, and the desk with its file.
 
+mod tags;
+
 use std::fs;
 use std::path::PathBuf;
 

@@ -23,6 +23,12 @@ use super::feed::Notification;
 /// The user and the password, if there is a user.
 pub(super) type Login = Option<(String, String)>;
 
+/// The most elements of an array that a server sends.
+const LONGEST_ARRAY: usize = 100_000;
+
+/// The largest message of a server, in bytes.
+const LARGEST_MESSAGE: usize = 16 << 20;
+
 /// The crate's client, for a peer whose data are stale after `max_age`.
 pub(super) fn client(options: &ClientOptions, pki: &Pki, max_age: Nanos) -> Client {
     let patience = max_age
@@ -52,6 +58,11 @@ pub(super) fn client(options: &ClientOptions, pki: &Pki, max_age: Nanos) -> Clie
         .request_timeout(patience.to_duration())
         .keep_alive_interval(heartbeat.to_duration())
         .max_failed_keep_alive_count(2)
+        // Some servers list all that is in a folder at once, and nodes can have long arrays: with the crate's limits, of
+        // 1,000 elements, the connection would end.
+        .max_array_length(LONGEST_ARRAY)
+        .max_message_size(LARGEST_MESSAGE)
+        .max_chunk_count(LARGEST_MESSAGE >> 13)
         .min_publish_interval(std::time::Duration::from_millis(1))
         .recreate_subscriptions(false);
     Client::new(builder.into_config())

@@ -10,11 +10,11 @@ use opcua::types::{
 
 use super::connect::{self, Login, Unopened};
 use super::dial::Dial;
-use super::feed::state;
+use super::feed::{Notification, state};
 use super::nodes::{self, ATTRIBUTES, READS, Server};
 use super::{Field, fields};
 use crate::pki::{Pki, meaning};
-use crate::reactor::{Driven, Reactor};
+use crate::reactor::{Driven, Inbox, Reactor};
 use crate::{ClientOptions, Policy, hello};
 use tickbus_base::time::{Clock, Nanos};
 use tickbus_fieldbus::PlcState;
@@ -30,14 +30,24 @@ const SINGLES: usize = 500;
 const TOGETHER: usize = 100;
 
 /// Where a conversation with a server stands.
-struct Line<'a> {
+pub(super) struct Line<'a> {
     options: &'a ClientOptions,
     peer: Peer,
     pki: Pki,
     client: opcua::client::Client,
     login: Login,
-    reactor: Reactor,
-    clock: Arc<dyn Clock>,
+    pub(super) reactor: Reactor,
+    /// The news of the session.
+    pub(super) inbox: Inbox<Notification>,
+    pub(super) clock: Arc<dyn Clock>,
+}
+
+/// A session with a server.
+pub(super) struct Met<'a> {
+    pub(super) line: Line<'a>,
+    endpoint: EndpointDescription,
+    pub(super) session: Arc<Session>,
+    pub(super) server: Server,
 }
 
 impl Line<'_> {
@@ -47,7 +57,8 @@ impl Line<'_> {
         Some(Dial::new(stream, &self.options.url.to_string()))
     }
 
-    fn drive<T>(&self, future: impl Future<Output = T>) -> Option<T> {
+    /// Runs `future` to its end; `None` if that takes longer than [`PATIENCE`], or was stopped.
+    pub(super) fn drive<T>(&self, future: impl Future<Output = T>) -> Option<T> {
         match self
             .reactor
             .drive(&*self.clock, self.clock.now() + PATIENCE, future)
@@ -60,22 +71,15 @@ impl Line<'_> {
 
 /// Examines the line of a client.
 pub(crate) fn examine(options: &ClientOptions, examination: &mut Examination<'_>) {
-    let Some((peer, mut wire)) = examination.reach(&options.url.address) else {
+    let Some(met) = meet(options, examination) else {
         return;
     };
-    if !hello::says_hello(examination, &mut wire, &options.url) {
-        return;
-    }
-    drop(wire);
-    let Some(line) = prepare(options, examination, peer) else {
-        return;
-    };
-    let Some(endpoint) = endpoint(&line, examination) else {
-        return;
-    };
-    let Some((session, server)) = open(&line, examination, &endpoint) else {
-        return;
-    };
+    let Met {
+        line,
+        endpoint,
+        session,
+        server,
+    } = met;
     let identity = connect::identity(&endpoint, &server.product);
     examination.compare_identity(&identity, options.write_to.as_deref());
     examination.sizes("the server reports changes");
@@ -90,6 +94,27 @@ pub(crate) fn examine(options: &ClientOptions, examination: &mut Examination<'_>
     }
     line.reactor
         .farewell(connect::FAREWELL, connect::close(session));
+}
+
+/// Opens a session, step by step; `None` if one has failed.
+pub(super) fn meet<'a>(
+    options: &'a ClientOptions,
+    examination: &mut Examination<'_>,
+) -> Option<Met<'a>> {
+    let (peer, mut wire) = examination.reach(&options.url.address)?;
+    if !hello::says_hello(examination, &mut wire, &options.url) {
+        return None;
+    }
+    drop(wire);
+    let line = prepare(options, examination, peer)?;
+    let endpoint = endpoint(&line, examination)?;
+    let (session, server) = open(&line, examination, &endpoint)?;
+    Some(Met {
+        line,
+        endpoint,
+        session,
+        server,
+    })
 }
 
 /// The step `certificates`: the files of this end.
@@ -120,6 +145,7 @@ fn prepare<'a>(
         pki,
         client,
         login,
+        inbox: reactor.inbox(),
         reactor,
         clock: Arc::clone(examination.setup.clock),
     })
@@ -194,7 +220,7 @@ fn open(
     endpoint: &EndpointDescription,
 ) -> Option<(Arc<Session>, Server)> {
     let dial = line.dial()?;
-    let inbox = line.reactor.inbox();
+    let inbox = line.inbox.clone();
     let opened = line.drive(async {
         let login = line.login.clone();
         let session = connect::open(

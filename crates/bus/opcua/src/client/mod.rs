@@ -1,5 +1,6 @@
 //! The client: reads a PLC that is an OPC UA server through a subscription, and writes to it by Write.
 
+mod browse;
 mod connect;
 mod dial;
 mod examine;
@@ -24,6 +25,7 @@ use tickbus_image::signal::{Area, DataType, Signal, SignalTable};
 use super::pki::Pki;
 use super::reactor::{Driven, Reactor};
 use super::{ClientOptions, NodeName, Policy};
+pub(crate) use browse::browse;
 use connect::Login;
 use dial::Dial;
 pub(crate) use examine::examine;

@@ -31,7 +31,7 @@ pub(super) const ATTRIBUTES: [AttributeId; 3] = [
 
 /// The bits of an access level.
 pub(super) const READS: u8 = 1;
-const WRITES: u8 = 2;
+pub(super) const WRITES: u8 = 2;
 
 /// The server's information about itself.
 pub(super) struct Server {

@@ -24,6 +24,11 @@ pub(crate) const TESTS: &[(&str, Test)] = &[
     ("the_doctor_and_find_know_asyncua", asyncua),
     #[cfg(feature = "opcua")]
     (
+        "a_server_that_asyncua_names_is_found_if_the_user_has_named_its_address",
+        discovery,
+    ),
+    #[cfg(feature = "opcua")]
+    (
         "the_doctor_names_what_a_secured_asyncua_refuses",
         secured_asyncua,
     ),
@@ -180,6 +185,44 @@ fn signal(node: &str, name: &str, data_type: &str) -> String {
     format!(
         "[fieldbus.at]\n\"{name}\" = \"{node}\"\n[[signal]]\nname = \"{name}\"\naddress = \"%QW0\"\ntype = \"{data_type}\"\n"
     )
+}
+
+#[cfg(feature = "opcua")]
+fn discovery() -> Result<(), Absent> {
+    use std::io::BufRead as _;
+    use std::process::Stdio;
+
+    let mut command = harness::python_with("main", &["asyncua"])?;
+    let script = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/tests/peers/opcua_discovery.py"
+    );
+    let mut servers = command
+        .arg(script)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("Python runs");
+    let mut ports = String::new();
+    let stdout = servers.stdout.take().expect("it is piped");
+    std::io::BufReader::new(stdout)
+        .read_line(&mut ports)
+        .expect("a line");
+    let mut ports = ports.split_whitespace();
+    let (own, other) = (ports.next().expect("two"), ports.next().expect("two"));
+    let output = tickbus(&["find", &format!("127.0.0.1:{own}")]);
+    let told = String::from_utf8_lossy(&output.stdout);
+    let named = format!("127.0.0.1:{own} names opc.tcp://127.0.0.1:{other}/press");
+    assert!(told.contains(&named), "{told}");
+    let found = format!("127.0.0.1:{other}");
+    let row = told.lines().find(|row| row.starts_with(&found));
+    assert!(
+        row.is_some_and(|row| row.contains("urn:test:press")),
+        "{told}"
+    );
+    drop(servers.stdin.take());
+    let _ = servers.wait();
+    Ok(())
 }
 
 #[cfg(feature = "opcua")]

@@ -2,6 +2,7 @@
 
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Key, Table};
+use tickbus_fieldbus::examine::Examination;
 use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, CYCLE, NamedFile, OpenError, Role};
 use tickbus_image::signal::{Area, Signal, SignalTable};
 
@@ -35,6 +36,10 @@ impl BusOptions for ClientOptions {
 
     fn files(&self) -> Vec<NamedFile> {
         Vec::new()
+    }
+
+    fn examine(&self, examination: &mut Examination<'_>) {
+        self.line.examine(examination);
     }
 
     fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
@@ -93,6 +98,10 @@ impl BusOptions for ReaderOptions {
 
     fn files(&self) -> Vec<NamedFile> {
         Vec::new()
+    }
+
+    fn examine(&self, examination: &mut Examination<'_>) {
+        self.line.examine(examination);
     }
 
     fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {

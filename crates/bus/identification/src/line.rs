@@ -7,6 +7,7 @@ use tickbus_base::os::{Parity, SerialSettings};
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Key, Shape, Table, Value, names};
 use tickbus_fieldbus::CYCLE;
+use tickbus_fieldbus::examine::Examination;
 use tickbus_net::serial;
 
 use crate::{CarrierType, Timing};
@@ -97,6 +98,20 @@ impl LineOptions {
     /// The name of the port that this end creates.
     pub(crate) fn made(&self) -> Option<&Path> {
         self.device.strip_prefix(PSEUDO).map(Path::new)
+    }
+
+    /// Examines the line as far as the port goes.
+    pub(crate) fn examine(&self, examination: &mut Examination<'_>) {
+        if let Some(link) = self.made() {
+            let evidence = format!("{} is made when the driver starts", link.display());
+            examination.ok("device", evidence);
+        } else if examination
+            .reach_serial(self.port(), self.settings())
+            .is_none()
+        {
+            return;
+        }
+        examination.unexamined("what the other end says");
     }
 
     /// The name for opening the port.

@@ -108,17 +108,14 @@ impl Options {
                     overhear(examination, &mut port, *baud, TRIED).is_legible()
                 })
         });
-        match legible {
-            Some(baud) => {
-                let evidence = format!("{evidence}; at {baud} baud they are");
-                let next = format!("write the rate of the master: baud = {baud}");
-                examination.fail("line", "wrong-settings", evidence, &next);
-            }
-            None => {
-                let next = "write the rate of the master, and check the plug: A and B, ground, termination; many adapters \
-                            do not reach 1.5 Mbit/s";
-                examination.fail("line", "damaged", evidence, next);
-            }
+        if let Some(baud) = legible {
+            let evidence = format!("{evidence}; at {baud} baud they are");
+            let next = format!("write the rate of the master: baud = {baud}");
+            examination.fail("line", "wrong-settings", evidence, &next);
+        } else {
+            let next = "write the rate of the master, and check the plug: A and B, ground, termination; many adapters do \
+                        not reach 1.5 Mbit/s";
+            examination.fail("line", "damaged", evidence, next);
         }
     }
 }

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_fieldbus::examine::{Datagrams, Peer, Search, Searching};
 
-use crate::finding::{ANSWER, CONNECT, Device, legible};
+use crate::device::{ANSWER, CONNECT, Device, legible};
 use crate::plan::Plan;
 
 /// How often the sockets are read while an answer is awaited.

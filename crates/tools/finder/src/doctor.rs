@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use crate::finding::{Device, speaks};
+use crate::device::Device;
+use crate::finding::speaks;
 use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_base::toml_text::printable;
 use tickbus_driver::{Code, Driver};

@@ -7,20 +7,13 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 
 use tickbus_base::os::raise_open_files;
-use tickbus_base::time::{Clock, Nanos, Stop};
-use tickbus_base::toml_text::printable;
+use tickbus_base::time::{Clock, Stop};
 use tickbus_fieldbus::examine::{Found, Peer, Search, Searching};
 use tickbus_net::{Limits, Swept, sweep};
 
 use crate::Plan;
 use crate::datagrams;
-
-/// The time in which a port must accept a connection. Below one second this is a single packet, as systems repeat it
-/// after one second (RFC 6298, 2.1).
-pub(crate) const CONNECT: Nanos = Nanos::from_millis(900);
-
-/// The time in which a device must answer a question.
-pub(crate) const ANSWER: Nanos = Nanos::from_millis(500);
+use crate::device::{ANSWER, CONNECT, Device, legible};
 
 /// How many devices are asked at the same time.
 const ASKED: usize = 64;
@@ -30,17 +23,6 @@ const FILES: usize = 8;
 
 /// The most connections that wait to be asked: some firewalls accept connections to every address.
 const WAITING: usize = 256;
-
-/// One device that answered.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Device {
-    /// The address of the device.
-    pub address: SocketAddr,
-    /// The name of the bus.
-    pub bus: &'static str,
-    /// The identity and further facts, without control characters.
-    pub found: Found,
-}
 
 /// The result of a search.
 #[derive(Clone, Debug, Default)]
@@ -219,25 +201,6 @@ pub(crate) fn speaks(
             found: legible(found),
         })
     })
-}
-
-/// Texts of a device as text: a terminal or a file must not take them for commands.
-pub(crate) fn legible(found: Found) -> Found {
-    let Found {
-        identity,
-        facts,
-        stanza,
-        named,
-    } = found;
-    let facts = facts
-        .into_iter()
-        .map(|(name, text)| (name, printable(&text)));
-    Found {
-        identity: printable(&identity),
-        facts: facts.collect(),
-        stanza: stanza.lines().map(|line| printable(line) + "\n").collect(),
-        named: named.iter().map(|url| printable(url)).collect(),
-    }
 }
 
 #[cfg(all(test, target_os = "linux"))]

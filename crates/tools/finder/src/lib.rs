@@ -10,12 +10,14 @@
 //! [`BusOptions::examine`](tickbus_fieldbus::BusOptions::examine). Nothing is written to anybody.
 
 mod datagrams;
+mod device;
 mod doctor;
 mod finding;
 mod plan;
 mod target;
 
+pub use device::Device;
 pub use doctor::{Terms, cause, examine};
-pub use finding::{Device, Findings, find};
+pub use finding::{Findings, find};
 pub use plan::{Plan, RATE};
 pub use target::Target;

@@ -7,7 +7,7 @@ use tickbus_base::time::{Clock, Stop};
 use tickbus_fieldbus::examine::Search;
 use tickbus_net::{Address, Error, look_up};
 
-use crate::finding::Device;
+use crate::device::Device;
 use crate::target::{Target, addresses};
 
 /// The usual number of connections per second.

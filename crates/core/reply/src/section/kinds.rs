@@ -402,8 +402,8 @@ fn span(reader: &Reader<'_>) -> Option<Span> {
 }
 
 /// The place of a sensor or an exit, which must be on a track of this length, if it has one.
-fn on_track(reader: &Reader<'_>, at: f64, length: Option<Option<f64>>) -> Option<f64> {
-    match length.flatten() {
+fn on_track(reader: &Reader<'_>, at: f64, length: Option<f64>) -> Option<f64> {
+    match length {
         Some(length) if !(0.0..=length).contains(&at) => {
             let [at, length] = [at, length].map(short_number);
             reader.wrong(
@@ -426,7 +426,7 @@ fn track(reader: &Reader<'_>) -> Option<Behaviour> {
         whole.into_iter().collect::<Option<()>>()?;
         Some(Sensor {
             signal: signal??,
-            at: on_track(sensor, at??, length)?,
+            at: on_track(sensor, at??, length.flatten())?,
             span: span?,
         })
     });
@@ -438,7 +438,7 @@ fn track(reader: &Reader<'_>) -> Option<Behaviour> {
             let signal = exit.number_made("signal");
             exit.require("at")?;
             Some(Exit {
-                at: on_track(exit, at??, length)?,
+                at: on_track(exit, at??, length.flatten())?,
                 when: when?,
                 span: span?,
                 signal: signal?,

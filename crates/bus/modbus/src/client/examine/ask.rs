@@ -231,9 +231,12 @@ impl Talk {
     }
 }
 
+/// Unit and PDU of a telegram.
+type Parsed = (u8, Vec<u8>);
+
 /// The number of characters up to the end of the first telegram, and its unit and PDU if it is whole; `None` if it has no
 /// end yet.
-fn ascii_telegram(characters: &[u8]) -> Option<(usize, Option<(u8, Vec<u8>)>)> {
+fn ascii_telegram(characters: &[u8]) -> Option<(usize, Option<Parsed>)> {
     let mut framer = ascii::Framer::new(ascii::SILENCE);
     let mut rest = characters;
     framer.arrived(Nanos::ZERO, &mut rest);

@@ -10,7 +10,7 @@ use super::ask::{Frame, Miss, Talk};
 use super::speak::answers;
 use crate::line::Serial;
 use crate::serial_settings::{others, written};
-use crate::{Coding, ascii, rtu};
+use crate::{Coding, PDU_LIMIT, rtu};
 
 /// How long the line is overheard before the first question.
 const OVERHEARD: Nanos = Nanos::from_millis(300);
@@ -40,7 +40,8 @@ impl ClientOptions {
                         resistors";
             examination.warn("line", "another-master", evidence, next);
         }
-        let longest = serial.settings.character().times(serial.coding.longest());
+        let longest = i64::try_from(serial.coding.characters(PDU_LIMIT)).unwrap_or_default();
+        let longest = serial.settings.character().times(2 * longest);
         let patience = examination.patience + longest;
         let mut talk = talk(examination, port, serial, patience);
         for station in 0..examination.setup.table.stations.len() {
@@ -63,16 +64,6 @@ impl ClientOptions {
         }
         let none = || None;
         self.look_at_values(examination, talk, (&serial.device, &none), |_| {});
-    }
-}
-
-impl Coding {
-    /// The characters of the longest question and answer.
-    const fn longest(self) -> i64 {
-        match self {
-            Self::Rtu => 2 * rtu::ADU_LIMIT as i64,
-            Self::Ascii => 2 * ascii::ADU_LIMIT as i64,
-        }
     }
 }
 

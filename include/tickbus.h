@@ -170,6 +170,12 @@ TB_IMPORT int32_t tb_send_many(const tb_driver *drivers, size_t count, int32_t *
  * ticks the driver calls this. TB_UNSUPPORTED: the time belongs to other participants as well, and the driver is as before. */
 TB_IMPORT int32_t tb_reset(tb_driver driver);
 
+/* Reads the driver.cfg again, and gives the line its settings while the simulation ticks: the present bus ends as with tb_close,
+ * and the new one opens; until its PLC sends something, data are stale. TB_FRESH: the line has other settings now;
+ * TB_UNCHANGED: it has those of the file already. Any thread may call this. TB_BAD_CONFIG: the file has mistakes;
+ * TB_UNSUPPORTED: more than the line differs, and tb_last_error says what; the line is then as before. */
+TB_IMPORT int32_t tb_reload(tb_driver driver);
+
 /* The values of a driver; NULL if it is not open. */
 TB_IMPORT tb_buffer *tb_buffer_of(tb_driver driver);
 

@@ -297,6 +297,19 @@ extern "C" fn tb_reset(driver: i64) -> i32 {
 }
 
 #[unsafe(no_mangle)]
+extern "C" fn tb_reload(driver: i64) -> i32 {
+    answer(|| {
+        let reload = DRIVERS.visit(driver, |opened| opened.device.reload())?;
+        let code = if reload.run()? {
+            Code::Fresh
+        } else {
+            Code::Unchanged
+        };
+        Ok(code.code())
+    })
+}
+
+#[unsafe(no_mangle)]
 extern "C" fn tb_buffer_of(driver: i64) -> *mut u64 {
     let mut words = null_mut();
     answer(|| {

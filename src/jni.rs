@@ -144,6 +144,20 @@ extern "system" fn Java_tickbus_Tickbus_resetNative<'local>(
         .resolve::<ThrowFieldbusException>();
 }
 
+/// `static native boolean reloadNative(long handle)`
+#[unsafe(no_mangle)]
+extern "system" fn Java_tickbus_Tickbus_reloadNative<'local>(
+    mut env: EnvUnowned<'local>,
+    _class: JClass<'local>,
+    handle: jlong,
+) -> jboolean {
+    env.with_env(|_| {
+        let reload = with(handle, |device| device.reload())?;
+        Ok::<jboolean, Failure>(reload.run()?)
+    })
+    .resolve::<ThrowFieldbusException>()
+}
+
 /// `static native void finalizeNative(long handle)`
 #[unsafe(no_mangle)]
 extern "system" fn Java_tickbus_Tickbus_finalizeNative<'local>(

@@ -70,8 +70,8 @@ pub(crate) fn show_driver(driver: &mut Driver) -> Result<Option<Place>, Refusal>
         // The simulation runs even without a reader of stderr.
         let _ = writeln!(io::stderr(), "tickbus: live page at {url}");
     };
-    let (path, kinds) = (config.path.clone(), config.kinds);
-    let read = move || Config::load(&path, kinds).map_err(|mistakes| mistakes.to_string());
+    let opened = std::sync::Arc::clone(&config);
+    let read = move || opened.read_again().map_err(|mistakes| mistakes.to_string());
     let shown = Shown {
         config: &config,
         line: driver.line(),

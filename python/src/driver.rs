@@ -198,6 +198,16 @@ impl Driver {
         Self::done(py, py.detach(|| self.handle.reset()))
     }
 
+    /// Reads the driver.cfg again, and gives the line its settings while the simulation ticks: the present bus ends as by
+    /// ``close()``, and the new one opens; until its PLC sends something, data are stale. Returns False if the line has
+    /// these settings already. Any thread may call this.
+    ///
+    /// Raises ``FieldbusError`` with ``Status.BAD_CONFIG`` if the file has mistakes, and with ``Status.UNSUPPORTED`` if
+    /// more than the line differs; the line is then as before.
+    fn reload(&self, py: Python<'_>) -> PyResult<bool> {
+        Self::done(py, py.detach(|| self.handle.reload()))
+    }
+
     /// Returns a signal by its name, always the same object; ``plc["Valve"]`` is the same.
     ///
     /// Raises ``UnknownSignalError``, a ``KeyError``, whose message contains the nearest name.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use tickbus_base::time::Nanos;
-use tickbus_binding::{Handles, Refusal, SignalDescription, closing, open};
+use tickbus_binding::{Handles, Refusal, Reload, SignalDescription, closing, open};
 use tickbus_driver::{Code, Driver, Exchange, Snapshot};
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::faults::{Fault, FaultBoard};
@@ -289,6 +289,11 @@ impl Handle {
 
     pub(crate) fn reset(&self) -> Result<(), Refusal> {
         self.visit(Opened::reset)?
+    }
+
+    pub(crate) fn reload(&self) -> Result<bool, Refusal> {
+        // Without the driver: the ticks go on meanwhile.
+        self.visit(|opened| Reload::of(&opened.driver))?.run()
     }
 
     pub(crate) fn snapshot(&self) -> Result<Snapshot, Refusal> {

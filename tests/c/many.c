@@ -105,6 +105,10 @@ int main(int count, char **arguments) {
     EXPECT(tb_reset(drivers[7]), TB_CLOSED);
     EXPECT(tb_reset(0), TB_NOT_OPEN);
 
+    /* The settings of the file, which has not changed. */
+    EXPECT(tb_reload(drivers[7]), TB_CLOSED);
+    EXPECT(tb_reload(0), TB_NOT_OPEN);
+
     /* Two threads at once. */
     EXPECT(tb_open(arguments[1], NULL, &drivers[7]), TB_FRESH);
     pthread_t threads[2];

@@ -16,6 +16,7 @@ use tickbus_image::signal::Slot;
 use crate::description::SignalDescription;
 use crate::fault::{declare_model_faults, inject};
 use crate::refusal::Refusal;
+use crate::reload::Reload;
 use crate::shared::{NO_TIME, Shared, Word};
 use crate::swallowed::swallowed;
 
@@ -138,6 +139,11 @@ impl<K> Device<K> {
     /// True if the bus has ended the run on its own, as virtual time does: further ticks bring nothing.
     pub fn is_over(&self) -> bool {
         self.driver.is_over()
+    }
+
+    /// What a reload of the driver.cfg needs; it runs without a claim on the driver.
+    pub fn reload(&self) -> Reload {
+        Reload::of(&self.driver)
     }
 
     /// The configuration that the driver was opened with.

@@ -10,6 +10,7 @@ mod handles;
 mod opening;
 mod panics;
 mod refusal;
+mod reload;
 mod shared;
 mod swallowed;
 
@@ -20,5 +21,6 @@ pub use handles::{Handles, MAX_DRIVERS, Reservation};
 pub use opening::{closing, load, open};
 pub use panics::panic_message;
 pub use refusal::Refusal;
+pub use reload::Reload;
 pub use shared::{NO_TIME, SPARE_SLOT, Shared, Word};
 pub use swallowed::swallowed;

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::driver_table::read_driver;
 use super::layout;
 use super::observer;
+use super::origin::Origin;
 use super::timing::{Line, Timing, TimingKeys};
 use crate::loopback;
 use crate::{Kinds, Options, PageOptions};
@@ -58,6 +59,8 @@ pub struct Config {
     pub record: Option<record::Options>,
     /// The live page, if the file asks for one.
     pub page: Option<PageOptions>,
+    /// What [reading the file again](Self::read_again) needs.
+    pub origin: Origin,
 }
 
 /// Says which end of the bus a command line asks for.
@@ -364,6 +367,7 @@ fn read(path: &Path, mut root: Table<'_>, given: Given) -> Option<Config> {
         timing: fieldbus.timing?,
         bus: fieldbus.bus?,
         kinds: given.1,
+        origin: Origin::of(given.0),
         events: fieldbus.events,
         life_signs,
         faults,

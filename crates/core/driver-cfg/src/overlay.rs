@@ -24,7 +24,11 @@ impl Config {
     ///
     /// Returns every mistake in the text.
     pub fn overlaid(self, origin: &str, text: &str) -> Result<Self, Mistakes> {
-        parse_text(origin, text, |root| read(self, root))
+        let mut config = parse_text(origin, text, |root| read(self, root))?;
+        if !text.is_empty() {
+            config.origin.overlaid(origin, text);
+        }
+        Ok(config)
     }
 }
 

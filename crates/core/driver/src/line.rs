@@ -19,7 +19,7 @@ use super::bus;
 use super::bus_handle::OpenBus;
 use super::host::OtherEnd;
 use super::open::counters_of;
-use super::statistics::ProgramCounters;
+use super::statistics::{BusName, ProgramCounters};
 use super::supervise::BusThread;
 
 /// A handle on the line of an open driver, for any thread. A handle that outlives its driver keeps nothing open.
@@ -49,6 +49,7 @@ pub(super) struct Ends {
     pub(super) name: String,
     pub(super) clock: Arc<dyn Clock>,
     pub(super) status: LinkStatus,
+    pub(super) bus_name: BusName,
     pub(super) scanned: Scanned,
 }
 
@@ -266,6 +267,7 @@ impl Shared {
                 watchdog: limit, ..
             } => limit.set(watchdog.unwrap_or(Nanos::MAX)),
         }
+        ends.bus_name.set(config.bus.kind());
         open.program = program;
         let mut port = ends.equipped(port.for_next_bus(watchdog), &config);
         port.opening("the line has other settings");

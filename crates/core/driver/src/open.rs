@@ -21,7 +21,7 @@ use super::real_time;
 use super::recording::{Recorded, recorder};
 use super::shape::Shape;
 use super::station::Station;
-use super::statistics::{Counters, ProgramCounters};
+use super::statistics::{BusName, Counters, ProgramCounters};
 use super::tick_counters::TickTimes;
 use super::{Driver, DriverError, Exchange, SlotMap, TickCounters};
 use tickbus_driver_cfg::Config;
@@ -69,7 +69,9 @@ impl Driver {
         let program_counters = ProgramCounters::new(counters_of(program.as_ref()));
         let line = (&status, &board, &swallowed);
         let opened = (bus, program);
-        let line = start(&config, opened, bus_end, times, line, &program_counters)?;
+        let bus_name = BusName::new(config.bus.kind());
+        let counters = (&program_counters, &bus_name);
+        let line = start(&config, opened, bus_end, times, line, counters)?;
         let stations = (0..config.table.stations.len())
             .map(|index| Station::new(&config.table, index, areas))
             .collect();
@@ -96,6 +98,7 @@ impl Driver {
             board,
             swallowed,
             program_counters,
+            bus_name,
             recorded: Recorded::default(),
             tap: None,
             config,
@@ -167,7 +170,7 @@ pub(super) fn start(
     image: BusEnd,
     (clock, time): (&Arc<dyn Clock>, &Arc<Manual>),
     (status, board, swallowed): (&LinkStatus, &Arc<FaultBoard>, &SwallowedSignals),
-    counters: &ProgramCounters,
+    (counters, bus_name): (&ProgramCounters, &BusName),
 ) -> Result<BusHandle, DriverError> {
     let (role, watchdog) = (config.role, config.timing.watchdog);
     let port = Port::new(image, Arc::clone(clock), role, watchdog, status.clone())
@@ -177,6 +180,7 @@ pub(super) fn start(
         name: config.name.clone(),
         clock: Arc::clone(clock),
         status: status.clone(),
+        bus_name: bus_name.clone(),
         scanned: Scanned::Ticks(counters.clone()),
     };
     Ok(match bus {

@@ -44,6 +44,28 @@ impl ProgramCounters {
     }
 }
 
+/// The kind of bus that a line has at present.
+#[derive(Clone, Debug)]
+pub(super) struct BusName(Arc<Mutex<&'static str>>);
+
+impl BusName {
+    pub(super) fn new(kind: &'static str) -> Self {
+        Self(Arc::new(Mutex::new(kind)))
+    }
+
+    pub(super) fn set(&self, kind: &'static str) {
+        *self.lock() = kind;
+    }
+
+    pub(super) fn get(&self) -> &'static str {
+        *self.lock()
+    }
+
+    fn lock(&self) -> MutexGuard<'_, &'static str> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
 /// The sources of the statistics of one end of a line, all readable from any thread.
 #[derive(Clone, Debug)]
 pub(super) struct Figures {
@@ -52,6 +74,7 @@ pub(super) struct Figures {
     pub(super) swallowed: SwallowedSignals,
     pub(super) program: ProgramCounters,
     pub(super) record: Option<Arc<RecorderCounters>>,
+    pub(super) bus: BusName,
 }
 
 /// The figures that only the ticks of a driver know, copied.

@@ -82,6 +82,11 @@ impl Watch {
         self.figures.status.max_age()
     }
 
+    /// Returns the kind of bus that the line has at present.
+    pub fn bus_kind(&self) -> &'static str {
+        self.figures.bus.get()
+    }
+
     /// Returns the area that this end writes.
     pub fn writes(&self) -> Area {
         self.role().areas().0

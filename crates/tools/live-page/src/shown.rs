@@ -267,7 +267,7 @@ impl Exhibit for Shown {
         let driver = DriverJson {
             id: self.id,
             name: &config.name,
-            kind: config.bus.kind(),
+            kind: self.watch.bus_kind(),
             role: self.watch.role().name(),
             picture: self.options.picture.is_some(),
             stations: stations.map(|station| station.name.as_str()).collect(),

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use crate::DriverError;
 use crate::line::{Ends, FreeLine, Line, Scanned};
 use crate::real_time;
-use crate::statistics::{Counters, Figures, ProgramCounters};
+use crate::statistics::{BusName, Counters, Figures, ProgramCounters};
 use crate::supervise::{BusThread, panic_text};
 use crate::watch::Watch;
 use tickbus_base::statistics::Statistics;
@@ -147,6 +147,7 @@ impl HostThread {
             swallowed: hosted.swallowed.clone(),
             program: ProgramCounters::new(Some(Arc::clone(&counters) as _)),
             record,
+            bus: BusName::new(config.bus.kind()),
         };
         let mut watch = None;
         if is_own {
@@ -166,6 +167,7 @@ impl HostThread {
             name: name.clone(),
             clock: Arc::clone(&counters.wall),
             status: status.clone(),
+            bus_name: figures.bus.clone(),
             scanned: Scanned::Program {
                 interval,
                 stop: stop.clone(),

@@ -294,6 +294,17 @@ public final class Tickbus implements AutoCloseable {
     }
 
     /**
+     * Lets the line take the settings that driver.cfg has now, while the simulation ticks. Called by any thread.
+     *
+     * @return false if the line has them already
+     * @throws FieldbusException {@link Status#UNSUPPORTED} if more than the line differs, {@link Status#BAD_CONFIG} and others
+     */
+    public boolean reload() {
+        mustBeOpen();
+        return reloadNative(handle);
+    }
+
+    /**
      * Retries a call that was refused because another thread's {@link #statistics}, {@link #inject} or {@link #close} was
      * using the driver. Those hold the driver only while they copy what they need, or take it over; after {@code close} the
      * result is {@link Status#CLOSED}.
@@ -657,44 +668,33 @@ public final class Tickbus implements AutoCloseable {
 
     /** The tick; returns a status code and never throws, for any handle. */
     static native int xChangeData(long handle);
-
     /** The receiving half of the tick; as {@link #xChangeData}. */
     static native int receiveNative(long handle);
-
     /** The sending half of the tick; as {@link #xChangeData}. */
     static native int sendNative(long handle);
-
     /** Begins the next episode; throws {@link FieldbusException}. */
     static native void resetNative(long handle);
-
+    /** Gives the line the settings of the file; throws {@link FieldbusException}. */
+    static native boolean reloadNative(long handle);
     /** Closes a driver; throws {@link FieldbusException}. */
     static native void finalizeNative(long handle);
-
     /** Closes a driver that was never closed, and logs its name; throws {@link FieldbusException}. */
     static native void forgottenNative(long handle);
-
     /** Text for {@link StatisticsText}; throws {@link FieldbusException}. */
     static native String statisticsNative(long handle);
-
     /** Moves events into {@code into}, three longs each; returns their number. Throws {@link FieldbusException}. */
     static native int eventsNative(long handle, long[] into);
-
     /** Injects the fault that a section describes, and returns its number; throws {@link FieldbusException}. */
     static native int injectNative(long handle, String fault);
-
     /** Ends a fault at the next exchange; false if it does not exist. Throws {@link FieldbusException}. */
     static native boolean endFaultNative(long handle, int id);
-
     /** A line per fault, with tabs between its fields; throws {@link FieldbusException}. */
     static native String faultsNative(long handle);
 
     static native boolean overNative(long handle);
-
     static native String pageNative(long handle);
-
     /** Makes the page of a recording; the text's first line is the heading. Throws {@link FieldbusException}. */
     static native String reportNative(String recording, String title, String statistics, String text);
-
     /** Does nothing: the cost of a native call, the baseline of the benchmarks. */
     static native int emptyNative();
 }

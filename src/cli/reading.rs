@@ -55,7 +55,7 @@ impl From<Mistakes> for Wrong {
 }
 
 impl Reading {
-    /// What this job and these arguments ask for.
+    /// The reading that this job and these arguments ask for.
     pub(super) fn new(job: &Job<'_>, arguments: &Hosting) -> Self {
         Self {
             file: job.file.to_owned(),

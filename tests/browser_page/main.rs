@@ -16,8 +16,8 @@ mod edited;
 mod live;
 mod run;
 mod studio;
-mod taken;
 mod studio_tags;
+mod taken;
 
 use std::io::{BufRead as _, BufReader, Lines, Write as _};
 use std::net::TcpStream;

@@ -20,7 +20,7 @@ pub(crate) const TESTS: &[(&str, Test)] = &[
     ),
 ];
 
-/// What only a simulation has; the mirror of this test scans as a program does.
+/// Metrics that only a simulation has; the mirror of this test scans as a program does.
 const OF_TICKS: [&str; 2] = ["tickbus_exchanges_total", "tickbus_exchange_seconds"];
 
 /// A program with text on its standard input; it must succeed. Returns its output.
@@ -174,7 +174,7 @@ impl Drop for Prometheus {
     }
 }
 
-/// What the panels of the dashboard ask, with all drivers and signals chosen.
+/// The queries of the dashboard, with all drivers and signals chosen.
 fn dashboard() -> Vec<String> {
     let text = fs::read_to_string("docs/grafana/dashboard.json").expect("it is there");
     let dashboard: serde_json::Value = serde_json::from_str(&text).expect("JSON");

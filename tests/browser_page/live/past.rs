@@ -18,7 +18,7 @@ const PICTURE: &str = "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 200 
 /// The text in the picture.
 const TOLD: &str = "pictures.all[0].root.querySelector('#told').textContent";
 
-/// What the row of the level shows.
+/// The row of the level, as it is shown.
 fn level(browser: &Browser) -> Value {
     browser.run("return tickbusPage.value('Level')")
 }

@@ -11,7 +11,7 @@ use tickbus::os::PseudoTerminal;
 
 const WORD: &str = "[[signal]]\nname = \"Life\"\naddress = \"%QW0\"\n";
 
-/// What the far end does.
+/// The behaviour of the far end.
 #[derive(Clone, Copy, Default)]
 struct Far {
     /// Answers this unit.

@@ -141,7 +141,7 @@ impl<K> Device<K> {
         self.driver.is_over()
     }
 
-    /// What a reload of the driver.cfg needs; it runs without a claim on the driver.
+    /// A reload of the driver.cfg; it runs without a claim on the driver.
     pub fn reload(&self) -> Reload {
         Reload::of(&self.driver)
     }

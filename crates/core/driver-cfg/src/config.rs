@@ -59,7 +59,7 @@ pub struct Config {
     pub record: Option<record::Options>,
     /// The live page, if the file asks for one.
     pub page: Option<PageOptions>,
-    /// What [reading the file again](Self::read_again) needs.
+    /// The surroundings of the file, for [reading it again](Self::read_again).
     pub origin: Origin,
 }
 

@@ -4,7 +4,7 @@ use tickbus_base::toml_text::Mistakes;
 
 use crate::{CommandLineEnd, Config};
 
-/// What was read beside the file.
+/// The surroundings that were read with the file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Origin {
     asked: Option<CommandLineEnd>,

@@ -101,7 +101,15 @@ impl Default for PageOptions {
 
 impl PageOptions {
     pub(super) fn read(mut table: Table<'_>) -> Option<Self> {
-        let [listen, grace, keep_forced, picture, token_file, edit, history] = [
+        let [
+            listen,
+            grace,
+            keep_forced,
+            picture,
+            token_file,
+            edit,
+            history,
+        ] = [
             "listen",
             "grace",
             "keep_forced",

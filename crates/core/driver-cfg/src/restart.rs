@@ -1,4 +1,4 @@
-//! What of another driver.cfg an open driver cannot take without a restart of the simulation.
+//! The differences of another driver.cfg that an open driver cannot take without a restart of the simulation.
 
 use std::fmt::Display;
 

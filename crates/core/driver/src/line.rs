@@ -53,7 +53,7 @@ pub(super) struct Ends {
     pub(super) scanned: Scanned,
 }
 
-/// Who ticks.
+/// The one that ticks.
 pub(super) enum Scanned {
     /// A simulation; the counters are those of a program at the other end.
     Ticks(ProgramCounters),

@@ -42,7 +42,7 @@ pub struct Listing {
     pub told: String,
 }
 
-/// What is wanted of a bus that browses.
+/// A wish to a bus that browses.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Wanted {
     /// The contents of the folder with this id; empty for the outermost one.
@@ -55,7 +55,7 @@ pub enum Wanted {
 
 /// Somebody who browses.
 pub trait Browsing {
-    /// What is wanted next.
+    /// The next wish.
     fn wanted(&mut self) -> Wanted;
 
     /// Takes the contents of a folder, or why the peer does not list them.

@@ -1,4 +1,4 @@
-//! What the system knows about a serial port before it is opened: whether it exists, who may use it, and who does.
+//! Facts about a serial port before it is opened: whether it exists, who may use it, and who does.
 
 use std::path::{Path, PathBuf};
 

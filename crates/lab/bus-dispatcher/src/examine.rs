@@ -6,7 +6,7 @@ use tickbus_fieldbus::examine::{Examination, Wire, WireEnd};
 
 use super::Options;
 
-/// What came of a visit.
+/// The outcome of a visit.
 enum Visit {
     /// The clients of the dispatcher.
     Devices(Vec<Device>),

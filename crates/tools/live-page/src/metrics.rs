@@ -183,7 +183,7 @@ fn line(families: &mut Families, labels: &Labels, driver: &dyn Exhibit) {
     }
 }
 
-/// What a driver counts and measures. Distributions are histograms, counts that only rise are counters, and everything
+/// The statistics of a driver. Distributions are histograms, counts that only rise are counters, and everything
 /// else keeps the key of docs/statistics.md.
 fn statistics(families: &mut Families, labels: &Labels, driver: &dyn Exhibit) {
     let statistics = driver.statistics();

@@ -26,7 +26,7 @@ const PATIENCE: Duration = Duration::from_secs(4);
 /// The most answers that nobody has fetched.
 const KEPT: usize = 50;
 
-/// What a page needs to know of a folder: its contents, or why there are none.
+/// A folder for a page: its contents, or why there are none.
 type Found = Result<Json, String>;
 
 /// The connection for browsing, and the questions to it.

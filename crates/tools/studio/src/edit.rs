@@ -59,9 +59,9 @@ pub(crate) enum Edit {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Made {
     pub(crate) text: String,
-    /// What was done, in words.
+    /// The edit in words.
     pub(crate) done: String,
-    /// What the editor does not see in the cell that it edits; can be empty.
+    /// Changes beside the cell that was edited, in words; can be empty.
     pub(crate) told: String,
 }
 

@@ -1,4 +1,4 @@
-//! What a page has not seen yet: of the rows, the addresses in the device and the text, what has changed since its last
+//! The news of a page: of the rows, the addresses in the device and the text, what has changed since its last
 //! look. A file of 5,000 signals is half a megabyte, and an edit a line.
 
 use std::collections::VecDeque;

@@ -23,12 +23,12 @@ pub struct Running {
     pub read: Read,
 }
 
-/// What the file asks of a line that runs.
+/// The changes that the file asks of a line that runs.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Asked {
     /// True if the file differs from the line.
     is_other: bool,
-    /// What of that needs a restart.
+    /// The changes that need a restart.
     restart: Vec<String>,
 }
 
@@ -37,7 +37,7 @@ impl Running {
         self.config.path.clone()
     }
 
-    /// What the file asks of the line. A file with mistakes asks for nothing: they are marked.
+    /// The changes that the file asks of the line. A file with mistakes asks for nothing: they are marked.
     pub(crate) fn asked(&self) -> Asked {
         let Ok(next) = (self.read)() else {
             return Asked::default();

@@ -344,7 +344,7 @@ impl Shared {
         state.to_string()
     }
 
-    /// What is in a folder of the PLC's tags.
+    /// The contents of a folder of the PLC's tags.
     fn tags(&self, id: &str) -> String {
         let (path, settings) = {
             let mut room = self.room();

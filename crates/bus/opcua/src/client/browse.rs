@@ -258,7 +258,7 @@ impl Folder<'_> {
         Ok(read)
     }
 
-    /// What is known of each node beside its name.
+    /// The facts of each node beside its name.
     fn facts(self, entries: &[(NodeId, ReferenceDescription)]) -> Result<Vec<Facts>, Trouble> {
         let wanted = entries.iter().flat_map(|(node, _)| {
             ATTRIBUTES.map(|attribute| ReadValueId::new(node.clone(), attribute))
@@ -430,7 +430,7 @@ enum Form {
     Structure,
 }
 
-/// What a server says of a node.
+/// The facts of a node, as its server states them.
 #[derive(Clone, Debug)]
 struct Facts {
     declared: NodeId,

@@ -269,11 +269,24 @@ def patch_bay(browser, album, work):
         album.add("patch-bay", browser.shoot())
 
 
+def petri_page(browser, album, _work):
+    """The net of the transport in the cell, twenty seconds after the start, when pallets have been stuck."""
+    with Program("tools/demo-cell", "--page", "127.0.0.1:0", BUILT="yes") as program:
+        browser.look(1470, 850)
+        browser.go(program.after("nets: live at "))
+        section = "[...document.querySelectorAll('#nets > *')].find((it) => it.querySelector('h2')?.textContent.startsWith('transport'))"
+        browser.wait(section)
+        time.sleep(20)
+        browser.run(f"document.getElementById('fit').click(); {section}.scrollIntoView({{ block: 'start', behavior: 'instant' }})")
+        time.sleep(1)
+        album.add("petri-page", browser.shoot())
+
+
 def main():
     work, images, *names = sys.argv[1:]
     album, work = Album(Path(images), names), Path(work)
     known = {"live-page": demo, "live-page-outage": demo, "report": demo, "studio": studio, "machine-two-tanks": two_tanks,
-             "patch-bay": patch_bay}
+             "patch-bay": patch_bay, "petri-page": petri_page}
     for name in names:
         if name not in known:
             sys.exit(f"pictures: there is no picture \"{name}\"; there are {', '.join(known)}")

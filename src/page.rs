@@ -8,14 +8,19 @@ mod none;
 mod open;
 
 #[cfg(not(feature = "page"))]
-pub(crate) use none::{Place, show, show_run, url};
+pub(crate) use none::{Place, show, show_run};
 #[cfg(feature = "page")]
-pub(crate) use open::{Place, options, show, show_run, url};
+pub(crate) use open::{Place, options, show, show_run};
 
-use std::io::{self, Write as _};
+#[cfg(all(feature = "doors", not(feature = "page")))]
+pub(crate) use none::url;
+#[cfg(all(feature = "doors", feature = "page"))]
+pub(crate) use open::url;
 
 use tickbus_binding::Refusal;
-use tickbus_driver::{Code, Driver, Line, Watch};
+#[cfg(feature = "doors")]
+use tickbus_driver::Driver;
+use tickbus_driver::{Code, Line, Watch};
 use tickbus_driver_cfg::Config;
 
 /// The end of a line that a page shows, and that it edits if the driver.cfg says so.
@@ -64,11 +69,14 @@ impl std::fmt::Display for PageError {
 
 /// Shows a simulation's driver on the page, if its driver.cfg asks for one. The address is printed on stderr, for
 /// whoever started the simulation.
+#[cfg(feature = "doors")]
 pub(crate) fn show_driver(driver: &mut Driver) -> Result<Option<Place>, Refusal> {
+    use std::io::Write as _;
+
     let config = std::sync::Arc::clone(driver.config());
     let announce = |url: &str| {
         // The simulation runs even without a reader of stderr.
-        let _ = writeln!(io::stderr(), "tickbus: live page at {url}");
+        let _ = writeln!(std::io::stderr(), "tickbus: live page at {url}");
     };
     let opened = std::sync::Arc::clone(&config);
     let read = move || opened.read_again().map_err(|mistakes| mistakes.to_string());

@@ -67,27 +67,28 @@ def test_its_exit_codes_are_those_of_the_command(command: list[str], tmp_path: P
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_machine_runs_and_ends_cleanly_by_a_signal(command: list[str], number: signal.Signals) -> None:
     ports = ["--address", "127.0.0.1:0", "--page", "127.0.0.1:0"]
-    machine = subprocess.Popen([*command, "machine", "two-tanks", *ports], stdout=subprocess.PIPE, text=True)
-    told = ""
-    while "listening on 127.0.0.1:" not in told:
-        line = machine.stdout.readline()
-        assert line, told
-        told += line
-    assert re.search(r"page at http://127\.0\.0\.1:\d+/", told)
-    machine.send_signal(number)
-    told = machine.communicate(timeout=30)[0]
+    with subprocess.Popen([*command, "machine", "two-tanks", *ports], stdout=subprocess.PIPE, text=True) as machine:
+        assert machine.stdout
+        told = ""
+        while "listening on 127.0.0.1:" not in told:
+            line = machine.stdout.readline()
+            assert line, told
+            told += line
+        assert re.search(r"page at http://127\.0\.0\.1:\d+/", told)
+        machine.send_signal(number)
+        told = machine.communicate(timeout=30)[0]
     assert machine.returncode == 0, told
     assert told.splitlines()[-1].startswith("machine: ok ")
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no signals")
 def test_ctrl_c_ends_a_command_that_does_not_wait_for_it(command: list[str]) -> None:
-    # It asks on a terminal; here it reads the end of a pipe that nobody closes.
-    reading = subprocess.Popen([*command, "compare", "/dev/stdin", "/dev/stdin"], stdin=subprocess.PIPE, stderr=subprocess.PIPE)
-    with pytest.raises(subprocess.TimeoutExpired):
-        reading.wait(1)
-    reading.send_signal(signal.SIGINT)
-    reading.communicate(timeout=30)
+    # It reads the end of a pipe that nobody closes.
+    with subprocess.Popen([*command, "import", "/dev/stdin"], stdin=subprocess.PIPE, stderr=subprocess.PIPE) as reading:
+        with pytest.raises(subprocess.TimeoutExpired):
+            reading.wait(1)
+        reading.send_signal(signal.SIGINT)
+        reading.communicate(timeout=30)
     assert reading.returncode in (-signal.SIGINT, 130)
 
 

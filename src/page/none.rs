@@ -42,6 +42,7 @@ pub(crate) fn show_run(
 }
 
 /// Returns `None`: there is no page.
+#[cfg(feature = "doors")]
 pub(crate) fn url() -> Option<String> {
     None
 }

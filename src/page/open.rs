@@ -61,6 +61,7 @@ fn present() -> MutexGuard<'static, Weak<Open>> {
 }
 
 /// Returns the address of the page with its token, if there is a page.
+#[cfg(feature = "doors")]
 pub(crate) fn url() -> Option<String> {
     Some(present().upgrade()?.url.clone())
 }

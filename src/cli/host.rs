@@ -9,6 +9,7 @@ use serde_json::{Map, Value, json};
 
 use super::Outcome;
 use super::json::{Format, print_document};
+pub(super) use super::reading::{PageAddress, page_address, recording};
 use super::reading::{Reading, Wrong};
 use crate::page::{self, PageError, Place, Shown};
 use tickbus_base::statistics::entries;
@@ -30,20 +31,20 @@ const LOOK: Nanos = Nanos::from_millis(20);
 pub(super) struct Hosting {
     /// Use this address instead of the one in FILE.
     #[arg(long, value_name = "HOST:PORT")]
-    pub(super) address: Option<String>,
+    address: Option<String>,
 
     /// Inject the faults in the `[[fault]]` sections of this file.
     #[arg(long, value_name = "FILE")]
-    pub(super) faults: Option<std::path::PathBuf>,
+    faults: Option<std::path::PathBuf>,
 
     /// Serve the live page, and print its address; without HOST:PORT, at the address in the page table of FILE, or at
     /// 127.0.0.1:20080.
     #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = "", value_parser = page_address)]
-    pub(super) page: Option<PageAddress>,
+    page: Option<PageAddress>,
 
     /// Let the page edit FILE, and the line take its changes; serves the page as --page does. On this computer alone.
     #[arg(long)]
-    pub(super) edit: bool,
+    edit: bool,
 
     /// Stop after this time [default: at Ctrl-C].
     #[arg(long, value_name = "TIME", value_parser = span)]
@@ -51,7 +52,7 @@ pub(super) struct Hosting {
 
     /// Record every scan to this file: a name ending in .vcd or .csv.
     #[arg(long, value_name = "FILE")]
-    pub(super) record: Option<PathBuf>,
+    record: Option<PathBuf>,
 
     /// Print statistics at the end, and every INTERVAL if one is given (--stats=1s).
     #[arg(long, value_name = "INTERVAL", num_args = 0..=1, require_equals = false,
@@ -71,32 +72,6 @@ impl Hosting {
             Box::new(io::stdout().lock())
         };
         out.write_all(text.as_bytes()).and_then(|()| out.flush())
-    }
-}
-
-/// The address at which to serve the page; `None` leaves it to the driver.cfg.
-#[derive(Clone, Debug)]
-pub(super) struct PageAddress(Option<Address>);
-
-/// Parses the value of --page.
-pub(super) fn page_address(text: &str) -> Result<PageAddress, String> {
-    let stated = (!text.is_empty()).then(|| super::lab::address(text));
-    Ok(PageAddress(stated.transpose()?))
-}
-
-impl PageAddress {
-    /// Asks for the page on behalf of the driver.cfg.
-    pub(super) fn ask(&self, config: &mut Config) {
-        let page = config.page.get_or_insert_default();
-        if let Some(address) = &self.0 {
-            page.listen = address.clone();
-        }
-    }
-
-    /// Returns the address of the page for a command without a driver.cfg.
-    pub(super) fn listen(&self) -> Address {
-        let usual = || PageOptions::default().listen;
-        self.0.clone().unwrap_or_else(usual)
     }
 }
 
@@ -142,7 +117,18 @@ pub(super) struct Job<'a> {
 /// Reads the driver.cfg, hosts the program, and reports on stdout.
 pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
     let (title, format) = (job.title, &arguments.format);
-    let reading = Reading::new(&job, arguments);
+    let reading = Reading {
+        file: job.file.to_owned(),
+        kinds: job.kinds,
+        role: job.role,
+        has_replies: job.has_replies,
+        bus: job.bus.map(str::to_owned),
+        address: arguments.address.clone(),
+        faults: arguments.faults.clone(),
+        record: arguments.record.clone(),
+        page: arguments.page.clone(),
+        edit: arguments.edit,
+    };
     let config = match reading.read() {
         Ok(config) => config,
         Err(Wrong::Mistakes(mistakes)) => return format.refuse(title, &mistakes),
@@ -286,14 +272,6 @@ fn outcome_of(is_wrong_input: bool) -> Outcome {
     } else {
         Outcome::BusFailed
     }
-}
-
-/// Returns the recording asked for on the command line. Its path is relative to the current folder, not to that of the
-/// driver.cfg.
-pub(super) fn recording(file: &Path) -> Result<record::Options, String> {
-    let path = std::path::absolute(file)
-        .map_err(|error| format!("\"{}\" is no path: {error}", file.display()))?;
-    record::Options::to(&path).map_err(|mistake| mistake.to_string())
 }
 
 /// Reports every change of the line, and the statistics when due, until stopped or done.

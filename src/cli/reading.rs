@@ -2,14 +2,49 @@
 //! take the changes of the file.
 
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
-use super::host::{Hosting, Job, PageAddress, recording};
 use tickbus_base::toml_text::Mistakes;
-use tickbus_driver_cfg::{CommandLineEnd, Config, Kinds};
+use tickbus_driver_cfg::{CommandLineEnd, Config, Kinds, PageOptions};
 use tickbus_fieldbus::Role;
+use tickbus_net::Address;
+use tickbus_record as record;
+
+/// The address at which to serve the page; `None` leaves it to the driver.cfg.
+#[derive(Clone, Debug)]
+pub(super) struct PageAddress(Option<Address>);
+
+/// Parses the value of --page.
+pub(super) fn page_address(text: &str) -> Result<PageAddress, String> {
+    let stated = (!text.is_empty()).then(|| super::lab::address(text));
+    Ok(PageAddress(stated.transpose()?))
+}
+
+impl PageAddress {
+    /// Asks for the page on behalf of the driver.cfg.
+    pub(super) fn ask(&self, config: &mut Config) {
+        let page = config.page.get_or_insert_default();
+        if let Some(address) = &self.0 {
+            page.listen = address.clone();
+        }
+    }
+
+    /// Returns the address of the page for a command without a driver.cfg.
+    pub(super) fn listen(&self) -> Address {
+        let usual = || PageOptions::default().listen;
+        self.0.clone().unwrap_or_else(usual)
+    }
+}
+
+/// Returns the recording asked for on the command line. Its path is relative to the current folder, not to that of the
+/// driver.cfg.
+pub(super) fn recording(file: &Path) -> Result<record::Options, String> {
+    let path = std::path::absolute(file)
+        .map_err(|error| format!("\"{}\" is no path: {error}", file.display()))?;
+    record::Options::to(&path).map_err(|mistake| mistake.to_string())
+}
 
 /// Keys that a kind of bus needs, with the value for a machine of which nobody need be kept away.
 const NEEDED: &[(&str, &str)] = &[("opcua-server", "anonymous = true\n")];
@@ -17,17 +52,17 @@ const NEEDED: &[(&str, &str)] = &[("opcua-server", "anonymous = true\n")];
 /// The parts of a command line that change what its driver.cfg says.
 #[derive(Clone, Debug)]
 pub(super) struct Reading {
-    file: PathBuf,
-    kinds: &'static Kinds,
-    role: Role,
-    has_replies: bool,
+    pub(super) file: PathBuf,
+    pub(super) kinds: &'static Kinds,
+    pub(super) role: Role,
+    pub(super) has_replies: bool,
     /// The kind of bus in the place of the file's own.
-    bus: Option<String>,
-    address: Option<String>,
-    faults: Option<PathBuf>,
-    record: Option<PathBuf>,
-    page: Option<PageAddress>,
-    edit: bool,
+    pub(super) bus: Option<String>,
+    pub(super) address: Option<String>,
+    pub(super) faults: Option<PathBuf>,
+    pub(super) record: Option<PathBuf>,
+    pub(super) page: Option<PageAddress>,
+    pub(super) edit: bool,
 }
 
 /// Why a driver.cfg cannot be used.
@@ -55,22 +90,6 @@ impl From<Mistakes> for Wrong {
 }
 
 impl Reading {
-    /// The reading that this job and these arguments ask for.
-    pub(super) fn new(job: &Job<'_>, arguments: &Hosting) -> Self {
-        Self {
-            file: job.file.to_owned(),
-            kinds: job.kinds,
-            role: job.role,
-            has_replies: job.has_replies,
-            bus: job.bus.map(str::to_owned),
-            address: arguments.address.clone(),
-            faults: arguments.faults.clone(),
-            record: arguments.record.clone(),
-            page: arguments.page.clone(),
-            edit: arguments.edit,
-        }
-    }
-
     /// Reads the file.
     pub(super) fn read(&self) -> Result<Config, Wrong> {
         let asked = CommandLineEnd {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::driver_table::read_driver;
 use super::layout;
 use super::observer;
-use super::origin::Origin;
+use super::origin::{CommandLineEnd, Origin};
 use super::timing::{Line, Timing, TimingKeys};
 use crate::loopback;
 use crate::{Kinds, Options, PageOptions};
@@ -61,15 +61,6 @@ pub struct Config {
     pub page: Option<PageOptions>,
     /// The surroundings of the file, for [reading it again](Self::read_again).
     pub origin: Origin,
-}
-
-/// Says which end of the bus a command line asks for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct CommandLineEnd {
-    /// The end. A file without a role serves both ends.
-    pub role: Role,
-    /// True if another address will replace the file's; see [`Options::set_address`].
-    pub moved: bool,
 }
 
 /// The values known before a file is read.

@@ -2,6 +2,7 @@
 //!
 //! [`Config`] is the checked content of a file. The caller passes in the [bus kinds](Kinds) that the file can name.
 
+mod again;
 mod config;
 mod contradictions;
 mod driver_table;
@@ -24,9 +25,9 @@ mod timing;
 #[cfg(test)]
 static KINDS: Kinds = Kinds::LOOPBACK.with_programs(tickbus_programs::PROGRAMS);
 
-pub use config::{CommandLineEnd, Config};
+pub use config::Config;
 pub use kinds::{Kind, Kinds};
 pub use options::Options;
-pub use origin::Origin;
+pub use origin::{CommandLineEnd, Origin};
 pub use page::PageOptions;
 pub use timing::Timing;

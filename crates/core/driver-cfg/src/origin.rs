@@ -1,15 +1,22 @@
 //! How the contents of a driver.cfg were read, so that they can be read again.
 
-use tickbus_base::toml_text::Mistakes;
+use tickbus_fieldbus::Role;
 
-use crate::{CommandLineEnd, Config};
+/// Says which end of the bus a command line asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CommandLineEnd {
+    /// The end. A file without a role serves both ends.
+    pub role: Role,
+    /// True if another address will replace the file's; see [`Options::set_address`].
+    pub moved: bool,
+}
 
 /// The surroundings that were read with the file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Origin {
-    asked: Option<CommandLineEnd>,
+    pub(crate) asked: Option<CommandLineEnd>,
     /// The tables that replaced the file's own, each with the name that mistakes in it have.
-    overlays: Vec<(String, String)>,
+    pub(crate) overlays: Vec<(String, String)>,
 }
 
 impl Origin {
@@ -22,43 +29,5 @@ impl Origin {
 
     pub(crate) fn overlaid(&mut self, name: &str, text: &str) {
         self.overlays.push((name.to_owned(), text.to_owned()));
-    }
-}
-
-impl Config {
-    /// Reads the file again, which may have changed, with the same tables in place of its own.
-    ///
-    /// # Errors
-    ///
-    /// As [`load_as`](Self::load_as) and [`overlaid`](Self::overlaid).
-    pub fn read_again(&self) -> Result<Self, Mistakes> {
-        let config = Self::load_as(&self.path, self.origin.asked, self.kinds);
-        let mut overlays = self.origin.overlays.iter();
-        overlays.try_fold(config?, |config, (name, text)| config.overlaid(name, text))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_file_is_read_again_with_the_tables_that_replaced_its_own() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let path = folder.path().join("driver.cfg");
-        let text = |name: &str| {
-            format!(
-                "[driver]\nid = 1\nname = \"{name}\"\n[fieldbus]\nkind = \"loopback\"\nlink = \"a\"\n\
-                 [[signal]]\nname = \"a\"\naddress = \"%IX0.0\"\n"
-            )
-        };
-        std::fs::write(&path, text("first")).expect("written");
-        let config = Config::load(&path, &crate::KINDS).expect("no mistakes");
-        let tables = "[fieldbus]\nkind = \"loopback\"\nlink = \"b\"\n";
-        let config = config.overlaid("tables", tables).expect("no mistakes");
-        assert_eq!(config.read_again(), Ok(config.clone()));
-        std::fs::write(&path, text("second")).expect("written");
-        let again = config.read_again().expect("no mistakes");
-        assert_eq!((&*again.name, &again.bus), ("second", &config.bus));
     }
 }

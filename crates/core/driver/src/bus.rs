@@ -90,6 +90,7 @@ fn open_hosted(
         has_watchdog: true,
         recorder: None,
         swallowed: swallowed.clone(),
+        own: None,
     };
     let line = (Bus::Free(bus(controller)), Stop::new());
     let host = HostThread::start(hosted, (config, Role::Controller), line, Arc::clone(clock))?;

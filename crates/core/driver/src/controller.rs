@@ -5,12 +5,12 @@ use std::sync::{Arc, PoisonError};
 use tickbus_base::Mistake;
 use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_fieldbus::faults::FaultStatus;
-use tickbus_fieldbus::{Bus, Hosted, Lead, Link};
+use tickbus_fieldbus::{Bus, Hosted, Lead, Link, MaxAge, SwallowedSignals};
 use tickbus_plc::Program;
 
 use super::bus_handle::{OpenBus, SteppedBus};
-use super::host::{HostThread, ScanSetup, check_fit};
-use super::line::Line;
+use super::host::{HostThread, ScanSetup, check_fit, watchdog};
+use super::line::{Line, Opened, Owner};
 use super::open::swallowed_of;
 use super::recording::{recorder, remember};
 use super::watch::Watch;
@@ -22,6 +22,45 @@ use tickbus_driver_cfg::Config;
 /// In the role Device, the program replaces the machine: `%Q` are its inputs, `%I` its outputs.
 #[derive(Debug)]
 pub struct Host(HostThread);
+
+/// The scans of a program, as the owner of its line.
+struct Scans {
+    interval: Nanos,
+    stop: Stop,
+    /// False if a late scan does not count as a broken line.
+    has_watchdog: bool,
+    /// How long the program can pause between two scans; [`Nanos::MAX`] for any time.
+    watchdog: MaxAge,
+}
+
+impl Owner for Scans {
+    fn open(
+        &self,
+        config: &Config,
+        clock: &Arc<dyn Clock>,
+        swallowed: &SwallowedSignals,
+    ) -> Result<Opened, DriverError> {
+        let hosted = Hosted {
+            interval: self.interval,
+            stop: &self.stop,
+        };
+        let bus = match bus::open(config, clock, Some(hosted), swallowed)?.0 {
+            OpenBus::Free(bus) => Some(bus),
+            OpenBus::Stepped(_) => None,
+        };
+        Ok(Opened {
+            bus,
+            other_end: None,
+        })
+    }
+
+    fn take(&self, config: &Config) -> Option<Nanos> {
+        let watchdog = watchdog(config, (true, config.role), self.interval);
+        let watchdog = watchdog.filter(|_| self.has_watchdog);
+        self.watchdog.set(watchdog.unwrap_or(Nanos::MAX));
+        watchdog
+    }
+}
 
 impl Host {
     /// Opens the bus that `config` describes and starts scanning `program` every `interval`. Opening does not wait for
@@ -96,7 +135,17 @@ impl Host {
         let is_stepped = matches!(bus, Bus::Stepped(_));
         let mut recorder = recorder(config, &map, None, is_stepped, &clock)?;
         remember(config, &map, None, &mut recorder, (is_stepped, &clock))?;
+        let watchdog = watchdog(config, (true, config.role), interval);
+        let watchdog = watchdog.filter(|_| has_watchdog);
+        let owner = Scans {
+            interval,
+            stop: stop.clone(),
+            has_watchdog,
+            watchdog: MaxAge::new(watchdog.unwrap_or(Nanos::MAX)),
+        };
+        let pause = owner.watchdog.clone();
         let hosted = ScanSetup {
+            own: Some((Box::new(owner), pause)),
             program,
             interval,
             has_watchdog,

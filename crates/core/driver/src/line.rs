@@ -4,22 +4,18 @@
 //! notice nothing but stale data: the image, the counters and the injected faults stay. All of this happens on the
 //! thread that asks for it.
 
+use std::any::Any;
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use tickbus_base::time::{Clock, Nanos, Stop};
+use tickbus_base::time::{Clock, Nanos};
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::{
-    Cause, ChangeEvents, Events, Free, Hosted, LinkState, LinkStatus, MaxAge, Port, Role,
-    SwallowedSignals,
+    Cause, ChangeEvents, Events, Free, LinkState, LinkStatus, Port, Role, SwallowedSignals,
 };
 
 use super::DriverError;
-use super::bus;
-use super::bus_handle::OpenBus;
-use super::host::OtherEnd;
-use super::open::counters_of;
-use super::statistics::{BusName, ProgramCounters};
+use super::statistics::BusName;
 use super::supervise::BusThread;
 
 /// A handle on the line of an open driver, for any thread. A handle that outlives its driver keeps nothing open.
@@ -50,29 +46,41 @@ pub(super) struct Ends {
     pub(super) clock: Arc<dyn Clock>,
     pub(super) status: LinkStatus,
     pub(super) bus_name: BusName,
-    pub(super) scanned: Scanned,
+    /// True if changes and writes of the peer can be reported one by one.
+    pub(super) reports_events: bool,
 }
 
-/// The one that ticks.
-pub(super) enum Scanned {
-    /// A simulation; the counters are those of a program at the other end.
-    Ticks(ProgramCounters),
-    /// A program at this end.
-    Program {
-        interval: Nanos,
-        stop: Stop,
-        /// False if a late scan does not count as a broken line.
-        has_watchdog: bool,
-        /// How long the program can pause between two scans; [`Nanos::MAX`] for any time.
-        watchdog: MaxAge,
-    },
+/// The owner of a line, which ticks: a simulation, or a program at this end.
+pub(super) trait Owner: Send + Sync {
+    /// Opens the bus that `config` describes, and starts the other end if that is in this process.
+    fn open(
+        &self,
+        config: &Config,
+        clock: &Arc<dyn Clock>,
+        swallowed: &SwallowedSignals,
+    ) -> Result<Opened, DriverError>;
+
+    /// The line takes the settings of `config`. Returns how long the ticks may pause before the peer gets fail-safe
+    /// values.
+    fn take(&self, config: &Config) -> Option<Nanos>;
 }
+
+/// A bus that an [`Owner`] has opened.
+pub(super) struct Opened {
+    /// `None` for a bus that the ticks run.
+    pub(super) bus: Option<Box<dyn Free>>,
+    pub(super) other_end: OtherEnd,
+}
+
+/// The other end of a bus, kept for its drop, if it is in this process.
+pub(super) type OtherEnd = Option<Box<dyn Any + Send>>;
 
 /// The line as the driver has it; dropping it closes the line.
 pub(super) struct FreeLine(Arc<Shared>);
 
 struct Shared {
     ends: Ends,
+    owner: Box<dyn Owner>,
     state: Mutex<Option<Open>>,
 }
 
@@ -80,8 +88,8 @@ struct Open {
     config: Arc<Config>,
     /// `None` if the line is lost.
     thread: Option<BusThread>,
-    /// The other end, if it is in this process. Dropped after the bus.
-    program: Option<OtherEnd>,
+    /// Dropped after the bus.
+    other_end: OtherEnd,
     swallowed: SwallowedSignals,
 }
 
@@ -90,19 +98,20 @@ impl FreeLine {
     pub(super) fn start(
         config: &Arc<Config>,
         (bus, port): (Box<dyn Free>, Port),
-        (program, swallowed): (Option<OtherEnd>, SwallowedSignals),
-        ends: Ends,
+        (other_end, swallowed): (OtherEnd, SwallowedSignals),
+        (ends, owner): (Ends, Box<dyn Owner>),
     ) -> Result<Self, DriverError> {
         let port = ends.equipped(port, config);
         let thread = ends.start(config, bus, port)?;
         let open = Open {
             config: Arc::clone(config),
             thread: Some(thread),
-            program,
+            other_end,
             swallowed,
         };
         Ok(Self(Arc::new(Shared {
             ends,
+            owner,
             state: Mutex::new(Some(open)),
         })))
     }
@@ -133,19 +142,6 @@ impl Drop for FreeLine {
 }
 
 impl Ends {
-    /// Returns how long the ticks may pause before the peer gets fail-safe values.
-    fn watchdog(&self, config: &Config) -> Option<Nanos> {
-        match &self.scanned {
-            Scanned::Ticks(_) => config.timing.watchdog,
-            Scanned::Program {
-                interval,
-                has_watchdog,
-                ..
-            } => super::host::watchdog(config, (true, config.role), *interval)
-                .filter(|_| *has_watchdog),
-        }
-    }
-
     /// Starts the thread of `bus`.
     pub(super) fn start(
         &self,
@@ -170,7 +166,7 @@ impl Ends {
         let port = port
             .with_life_signs(config.life_signs.watches(table, role, max_age))
             .with_names(table.stations.iter().map(|s| s.name.as_str()));
-        if config.events == Events::None || matches!(self.scanned, Scanned::Program { .. }) {
+        if config.events == Events::None || !self.reports_events {
             return port;
         }
         let (_, rx) = role.areas();
@@ -232,21 +228,12 @@ impl Shared {
 
     fn switch(&self, open: &mut Open, config: Config) -> Result<(), Untaken> {
         let ends = &self.ends;
-        let hosted = match &ends.scanned {
-            Scanned::Program { interval, stop, .. } => Some(Hosted {
-                interval: *interval,
-                stop,
-            }),
-            Scanned::Ticks(_) => None,
-        };
         // Before the old bus ends: what cannot be opened must not cost the line.
-        let (bus, program) = match bus::open(&config, &ends.clock, hosted, &open.swallowed)? {
-            (OpenBus::Free(bus), program) => (bus, program),
-            (OpenBus::Stepped(_), _) => {
-                let kind = config.bus.kind();
-                let what = format!("a bus \"{kind}\" runs in step with the simulation");
-                return Err(Untaken::NeedsRestart(vec![what]));
-            }
+        let Opened { bus, other_end } = self.owner.open(&config, &ends.clock, &open.swallowed)?;
+        let Some(bus) = bus else {
+            let kind = config.bus.kind();
+            let what = format!("a bus \"{kind}\" runs in step with the simulation");
+            return Err(Untaken::NeedsRestart(vec![what]));
         };
         let old = open.thread.take().ok_or_else(|| {
             Untaken::Lost("the bus of this line is stuck since the last change".to_owned())
@@ -260,15 +247,9 @@ impl Shared {
             return Err(Untaken::Lost(why.to_owned()));
         };
         ends.status.limit().set(config.timing.max_age);
-        let watchdog = ends.watchdog(&config);
-        match &ends.scanned {
-            Scanned::Ticks(counters) => counters.replace(counters_of(program.as_ref())),
-            Scanned::Program {
-                watchdog: limit, ..
-            } => limit.set(watchdog.unwrap_or(Nanos::MAX)),
-        }
+        let watchdog = self.owner.take(&config);
         ends.bus_name.set(config.bus.kind());
-        open.program = program;
+        open.other_end = other_end;
         let mut port = ends.equipped(port.for_next_bus(watchdog), &config);
         port.opening("the line has other settings");
         match ends.start(&config, bus, port) {

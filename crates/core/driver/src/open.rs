@@ -16,7 +16,7 @@ use super::extras::Extras;
 use super::frames::directions;
 use super::heartbeat::Beat;
 use super::host::OtherEnd;
-use super::line::{Ends, FreeLine, Scanned};
+use super::line::{self, Ends, FreeLine, Opened, Owner};
 use super::real_time;
 use super::recording::{Recorded, recorder};
 use super::shape::Shape;
@@ -181,12 +181,13 @@ pub(super) fn start(
         clock: Arc::clone(clock),
         status: status.clone(),
         bus_name: bus_name.clone(),
-        scanned: Scanned::Ticks(counters.clone()),
+        reports_events: true,
     };
     Ok(match bus {
         OpenBus::Free(bus) => {
-            let other = (program, swallowed.clone());
-            BusHandle::Free(FreeLine::start(config, (bus, port), other, ends)?)
+            let other = (boxed(program), swallowed.clone());
+            let owner = Box::new(Ticks(counters.clone()));
+            BusHandle::Free(FreeLine::start(config, (bus, port), other, (ends, owner))?)
         }
         OpenBus::Stepped(bus) => BusHandle::Stepped {
             bus,
@@ -194,6 +195,39 @@ pub(super) fn start(
             time: Arc::clone(time),
         },
     })
+}
+
+/// The ticks of a simulation, as the owner of a line. The counters are those of a program at the other end.
+struct Ticks(ProgramCounters);
+
+impl Owner for Ticks {
+    fn open(
+        &self,
+        config: &Config,
+        clock: &Arc<dyn Clock>,
+        swallowed: &SwallowedSignals,
+    ) -> Result<Opened, DriverError> {
+        let (bus, program) = bus::open(config, clock, None, swallowed)?;
+        let OpenBus::Free(bus) = bus else {
+            return Ok(Opened {
+                bus: None,
+                other_end: None,
+            });
+        };
+        self.0.replace(counters_of(program.as_ref()));
+        Ok(Opened {
+            bus: Some(bus),
+            other_end: boxed(program),
+        })
+    }
+
+    fn take(&self, config: &Config) -> Option<Nanos> {
+        config.timing.watchdog
+    }
+}
+
+fn boxed(program: Option<OtherEnd>) -> line::OtherEnd {
+    program.map(|program| Box::new(program) as _)
 }
 
 /// Creates the extra work of a driver without faults.

@@ -101,8 +101,7 @@ impl BusThread {
         self.handover.goes_on.store(true, Ordering::SeqCst);
         let handover = Arc::clone(&self.handover);
         drop(self);
-        let port = handover.lock().take();
-        port
+        handover.lock().take()
     }
 
     /// Leaves the peer, if there is one, with the fail-safe values.

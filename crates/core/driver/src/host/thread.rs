@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::DriverError;
-use crate::line::{Ends, FreeLine, Line, Scanned};
+use crate::line::{Ends, FreeLine, Line, Owner};
 use crate::real_time;
 use crate::statistics::{BusName, Counters, Figures, ProgramCounters};
 use crate::supervise::{BusThread, panic_text};
@@ -16,7 +16,7 @@ use tickbus_base::time::{Clock, Manual, Nanos, Pace, Stop};
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::faults::FaultBoard;
 use tickbus_fieldbus::{
-    Bus, BusError, Lead, LinkState, LinkStatus, MaxAge, Outputs, Port, Role, Stepped,
+    Bus, BusError, Free, Lead, LinkState, LinkStatus, MaxAge, Outputs, Port, Role, Stepped,
     SwallowedSignals,
 };
 use tickbus_image::Peers;
@@ -61,6 +61,9 @@ pub(crate) struct ScanSetup {
     pub(crate) recorder: Option<Recorder>,
     /// Counts the changes that are swallowed at its end of the line.
     pub(crate) swallowed: SwallowedSignals,
+    /// At the end that the driver.cfg describes: the owner of the line, and the program's watchdog, [`Nanos::MAX`] for
+    /// none, which the owner may change.
+    pub(crate) own: Option<(Box<dyn Owner>, MaxAge)>,
 }
 
 /// The counters and the state that a program's thread publishes.
@@ -162,35 +165,17 @@ impl HostThread {
             (end.max_age, cpu.max_age) = (status.limit(), status.limit());
             cpu.own = Some(end);
         }
-        let pause = MaxAge::new(watchdog.unwrap_or(Nanos::MAX));
-        let ends = Ends {
-            name: name.clone(),
-            clock: Arc::clone(&counters.wall),
-            status: status.clone(),
-            bus_name: figures.bus.clone(),
-            scanned: Scanned::Program {
-                interval,
-                stop: stop.clone(),
-                has_watchdog: hosted.has_watchdog,
-                watchdog: pause.clone(),
-            },
+        let ends = ends_of(name, &counters, &figures);
+        let (owner, pause) = match hosted.own {
+            Some((owner, pause)) => (Some(owner), pause),
+            None => (None, MaxAge::new(watchdog.unwrap_or(Nanos::MAX))),
         };
         let (scanned, stopped) = (Arc::clone(&counters), stop.clone());
         let (bus, mut scans): (_, Box<dyn FnMut() -> Result<(), String> + Send>) = match bus {
             Bus::Free(bus) => {
                 let (real_time, scanning) = (config.real_time, status.clone());
-                let bus = if is_own {
-                    let own = Arc::new(config.clone());
-                    let other = (None, figures.swallowed.clone());
-                    HostBus::Own(FreeLine::start(&own, (bus, port), other, ends)?)
-                } else {
-                    // The machine at the other end of this line closes with the program.
-                    let mut config = config.clone();
-                    (config.timing.at_close, config.timing.while_stale) =
-                        (Outputs::Hold, Outputs::Hold);
-                    let port = ends.equipped_as(role, port, &config);
-                    HostBus::Other(ends.start(&config, bus, port)?)
-                };
+                let swallowed = figures.swallowed.clone();
+                let bus = start_bus((bus, port), (config, role), (ends, owner), swallowed)?;
                 let scans = move || {
                     real_time::begin(real_time, "the PLC program", &scanning, &*scanned.wall);
                     scan_until_stopped(&mut cpu, (interval, &pause), &stopped, &scanned);
@@ -219,16 +204,9 @@ impl HostThread {
             scanned.scanning.set(None);
             // Dropping the bus can send a farewell to the peer, and closing waits for that.
             drop(scans);
-            let text = match result {
-                Ok(Ok(())) => return,
-                Ok(Err(text)) => text,
-                Err(panic) => {
-                    let text = format!("the PLC program panicked: {}", panic_text(&*panic));
-                    log::error!("{text}");
-                    text
-                }
-            };
-            *scanned.lock_fault() = Some(text);
+            if let Some(fault) = fault_of(result) {
+                *scanned.lock_fault() = Some(fault);
+            }
         });
         let thread = spawned.map_err(|source| DriverError::no_thread("the PLC program", source))?;
         Ok(Self {
@@ -240,6 +218,48 @@ impl HostThread {
             thread: Some(thread),
             bus,
         })
+    }
+}
+
+/// Returns the end of a line that a program scans.
+fn ends_of(name: &str, counters: &HostCounters, figures: &Figures) -> Ends {
+    Ends {
+        name: name.to_owned(),
+        clock: Arc::clone(&counters.wall),
+        status: figures.status.clone(),
+        bus_name: figures.bus.clone(),
+        reports_events: false,
+    }
+}
+
+/// Starts the bus thread of the end with `role`, which has an owner if it is the one that the driver.cfg describes.
+fn start_bus(
+    (bus, port): (Box<dyn Free>, Port),
+    (config, role): (&Config, Role),
+    (ends, owner): (Ends, Option<Box<dyn Owner>>),
+    swallowed: SwallowedSignals,
+) -> Result<HostBus, DriverError> {
+    if let Some(owner) = owner {
+        let config = Arc::new(config.clone());
+        let line = FreeLine::start(&config, (bus, port), (None, swallowed), (ends, owner))?;
+        return Ok(HostBus::Own(line));
+    }
+    // The machine at the other end of this line closes with the program.
+    let mut config = config.clone();
+    (config.timing.at_close, config.timing.while_stale) = (Outputs::Hold, Outputs::Hold);
+    let port = ends.equipped_as(role, port, &config);
+    Ok(HostBus::Other(ends.start(&config, bus, port)?))
+}
+
+/// Returns why scanning ended, if it should not have ended.
+fn fault_of(result: std::thread::Result<Result<(), String>>) -> Option<String> {
+    match result {
+        Ok(ended) => ended.err(),
+        Err(panic) => {
+            let text = format!("the PLC program panicked: {}", panic_text(&*panic));
+            log::error!("{text}");
+            Some(text)
+        }
     }
 }
 

@@ -97,6 +97,7 @@ fn a_bus_that_is_stuck_cannot_hide_it_from_who_asks_for_the_state_of_the_line() 
     let ((let_end, end), (begun, _has_begun), (let_scan, scan)) = (channel(), channel(), channel());
     drop(let_scan);
     let hosted = ScanSetup {
+        own: None,
         program: Box::new(Slow {
             can_hang: false,
             begun,

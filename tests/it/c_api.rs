@@ -157,6 +157,14 @@ fn many_drivers_tick_in_one_call_each_with_its_own_time_and_status() {
 }
 
 #[test]
+fn a_line_takes_the_changes_of_its_file() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let program = compile(&["cc", "-std=c11"], "tests/c/reload.c", folder.path());
+    let output = run(&program, folder.path(), &["reload.cfg"]);
+    assert!(output.status.success(), "{output:?}");
+}
+
+#[test]
 fn a_loop_learns_that_the_run_is_over() {
     let folder = folder_with_tank();
     let program = compile(&["cc", "-std=c99"], "tests/c/over.c", folder.path());

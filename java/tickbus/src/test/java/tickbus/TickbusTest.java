@@ -58,6 +58,27 @@ class TickbusTest {
     }
 
     @Test
+    void theLineTakesTheChangesOfItsFileWhileTheSimulationTicks() throws IOException {
+        String first = DriverCfg.freshLink();
+        String second = DriverCfg.freshLink();
+        Path file = DriverCfg.link(1, first, "device").signal("in", "%IB0").signal("out", "%QB0").write(directory);
+        try (Tickbus machine = Tickbus.open(file);
+                Tickbus plc = DriverCfg.link(2, second, "controller").signal("in", "%IB0").signal("out", "%QB0")
+                    .open(directory)) {
+            assertFalse(machine.reload(), "nothing has changed");
+            Files.writeString(file, Files.readString(file).replace(first, second));
+            assertTrue(machine.reload());
+            plc.signal("out").set(9);
+            exchangeUntil(() -> machine.signal("out").get() == 9, machine, plc);
+            Files.writeString(file, Files.readString(file).replace("%QB0", "%QB1"));
+            String refused = assertThrows(FieldbusException.class, machine::reload).getMessage();
+            assertTrue(refused.contains("signal 2 \"out\" has another address"), refused);
+            plc.signal("out").set(10);
+            exchangeUntil(() -> machine.signal("out").get() == 10, machine, plc);
+        }
+    }
+
+    @Test
     void aTickThatWasReceivedAndNotAnsweredIsRecordedWhenTheDriverCloses() throws IOException {
         List<List<String>> runs = new ArrayList<>();
         for (boolean answered : new boolean[] {true, false}) {

@@ -90,6 +90,7 @@ fn an_outage_is_found_and_the_time_before_it_is_saved() {
     let mut plc = machine.plc();
     let browser = open(&machine, 1280, 900);
     browser.wait("plant.signals.every((it) => !it.isStale)");
+    browser.wait("plant.drivers[0].line.state === 'running' && plant.drivers[0].line.since_ms > 1500");
     plc.kill();
     browser.wait("plant.signals.some((it) => it.isStale)");
     browser.run("document.getElementById('more-time').open = true");
@@ -104,6 +105,8 @@ fn an_outage_is_found_and_the_time_before_it_is_saved() {
     browser.run("bar.step(-1)");
     browser.wait(&format!("!({stale})"));
     browser.wait("!document.querySelector('.picture').classList.contains('is-stale')");
+    // The line broke before the data were too old.
+    browser.run("bar.show(`at/${bar.moment.ms - 1000}`)");
     browser.wait("document.querySelector('.driver .tag').textContent === 'running'");
     browser.run("const real = URL.createObjectURL; URL.createObjectURL = (it) => { window.saved = it; return real(it); }");
     for (ending, begin) in [
@@ -192,7 +195,7 @@ fn the_bar_fits_every_screen_in_the_light_and_in_the_dark() {
             shoot(
                 &browser,
                 shots.as_deref(),
-                &format!("live-{scheme}-{width}"),
+                &format!("live-{scheme}-{width}.png"),
                 false,
             );
             browser.run("document.getElementById('goal').value = 'signal'; document.getElementById('more-time').open = true; await bar.jump(false); bar.step(-1); for (let i = 0; i < 30; i++) await new Promise((go) => requestAnimationFrame(go))");
@@ -200,7 +203,7 @@ fn the_bar_fits_every_screen_in_the_light_and_in_the_dark() {
             shoot(
                 &browser,
                 shots.as_deref(),
-                &format!("past-{scheme}-{width}"),
+                &format!("past-{scheme}-{width}.png"),
                 false,
             );
         }

@@ -160,7 +160,7 @@ const bar = (() => {
 
   function paint() {
     colours ??= coloursAt(document.body);
-    const [width, height] = [canvas.clientWidth, 10];
+    const [width, height] = [get("track").clientWidth, 10];
     const ctx = context(canvas, width, height);
     const { first, last } = lead.past;
     // As wide as the way of the handle.
@@ -205,7 +205,7 @@ const bar = (() => {
     get("pause").hidden = Boolean(moment);
     get("to-live").hidden = !moment;
     if (moment) text(get("to-live"), `Live: +${words.span(ago)}`);
-    text(get("moment"), moment ? `${words.moment(at)} · tick ${moment.tick.toLocaleString("en")}` : `the last ${span}${isCut ? "" : ", from the start"}`);
+    text(get("moment"), moment ? `${words.moment(at)} · tick ${moment.tick.toLocaleString("en")}` : isCut ? `the last ${span} kept` : `${span} recorded`);
     const chosen = act.chosen();
     text(get("goal-signal"), chosen ? `change of ${chosen.name}` : "change of a signal");
     if (moment && moment.ms < first) act.say("The oldest moments have left the memory; the page shows the oldest that is left.");

@@ -90,7 +90,8 @@ fn an_outage_is_found_and_the_time_before_it_is_saved() {
     let mut plc = machine.plc();
     let browser = open(&machine, 1280, 900);
     browser.wait("plant.signals.every((it) => !it.isStale)");
-    browser.wait("plant.drivers[0].line.state === 'running' && plant.drivers[0].line.since_ms > 1500");
+    browser
+        .wait("plant.drivers[0].line.state === 'running' && plant.drivers[0].line.since_ms > 1500");
     plc.kill();
     browser.wait("plant.signals.some((it) => it.isStale)");
     browser.run("document.getElementById('more-time').open = true");

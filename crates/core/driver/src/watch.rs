@@ -11,7 +11,7 @@ use tickbus_fieldbus::faults::{
 };
 use tickbus_fieldbus::{Link, Role};
 use tickbus_image::signal::{Area, Slot};
-use tickbus_record::History;
+use tickbus_record::{History, Recorder};
 
 use super::SlotMap;
 use super::statistics::{Figures, TickFigures};
@@ -45,7 +45,7 @@ impl Watch {
     pub(super) fn new(
         config: Arc<Config>,
         clock: Arc<dyn Clock>,
-        (figures, history): (Figures, Option<Arc<History>>),
+        (figures, recorder): (Figures, Option<&Recorder>),
         is_driver: bool,
     ) -> (Tap, Self) {
         let table = &config.table;
@@ -58,7 +58,7 @@ impl Watch {
             handle,
             clock,
             figures,
-            history,
+            history: recorder.and_then(Recorder::history).map(Arc::clone),
             is_driver,
             times: TickTimes::default(),
             asked: None,

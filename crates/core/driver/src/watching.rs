@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::Slot;
-use tickbus_record::Recorder;
 
 use super::bus_handle::{BusHandle, SteppedBus};
 use super::recording::remember;
@@ -37,9 +36,8 @@ impl Driver {
             );
         }
         self.shape = self.fitting_shape();
-        let history = self.recorder.as_ref().and_then(Recorder::history);
-        let history = history.map(Arc::clone);
-        let (tap, watch) = Watch::new(config, clock, (self.figures(), history), true);
+        let seen = (self.figures(), self.recorder.as_ref());
+        let (tap, watch) = Watch::new(config, clock, seen, true);
         self.tap = Some(tap);
         watch
     }

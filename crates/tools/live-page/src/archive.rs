@@ -103,12 +103,11 @@ impl Archive {
         for fault in faults {
             let now = (fault.id, fault.phase, fault.begun);
             let place = seen.iter_mut().find(|(id, ..)| *id == fault.id);
-            let is_new = match place {
-                Some(known) => std::mem::replace(known, now) != now,
-                None => {
-                    seen.push(now);
-                    fault.begun > 0
-                }
+            let is_new = if let Some(known) = place {
+                std::mem::replace(known, now) != now
+            } else {
+                seen.push(now);
+                fault.begun > 0
             };
             if !is_new || fault.begun == 0 {
                 continue;
@@ -343,10 +342,6 @@ impl Archive {
             }
         };
         let found = found.map(|(tick, time)| json!({ "tick": tick, "ms": millis(time) }));
-        Some(
-            found
-                .map_or_else(|| json!({ "tick": null }), |found| found)
-                .to_string(),
-        )
+        Some(found.unwrap_or_else(|| json!({ "tick": null })).to_string())
     }
 }

@@ -86,7 +86,7 @@ pub(crate) fn raw_follows(signal: &Signal, slot: Slot, bits: u64) -> bool {
     }
     #[expect(clippy::cast_possible_truncation, reason = "compared with what it was")]
     match signal.data_type {
-        DataType::Bool => bits == u64::from(value == 1.0) && (value == 0.0 || value == 1.0),
+        DataType::Bool => f64::from(u8::from(bits != 0)).to_bits() == value.to_bits(),
         DataType::Real => {
             !value.is_nan()
                 && f64::from(value as f32).to_bits() == value.to_bits()

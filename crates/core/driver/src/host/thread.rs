@@ -118,7 +118,6 @@ impl HostThread {
         let name = &format!("plc {}", hosted.program.name());
         let (max_age, interval) = (config.timing.max_age, hosted.interval);
         let (report, can_hang) = (hosted.program.report(), hosted.program.can_hang());
-        let record = hosted.recorder.as_ref().map(|it| Arc::clone(it.counters()));
         let (mut cpu, bus_end) = half(hosted.program, (config, role), hosted.swallowed.counts());
         let status = LinkStatus::new(name, max_age);
         // The faults in a driver.cfg apply to its own end, not to a program behind its bus. The same is true of a
@@ -149,16 +148,15 @@ impl HostThread {
             board: Arc::clone(&board),
             swallowed: hosted.swallowed.clone(),
             program: ProgramCounters::new(Some(Arc::clone(&counters) as _)),
-            record,
+            record: hosted.recorder.as_ref().map(|it| Arc::clone(it.counters())),
             bus: BusName::new(config.bus.kind()),
         };
         let mut watch = None;
         if is_own {
             port = port.with_swallowed(hosted.swallowed);
             let (config, clock) = (Arc::new(config.clone()), Arc::clone(&counters.clock));
-            let history = hosted.recorder.as_ref().and_then(Recorder::history);
-            let history = (figures.clone(), history.map(Arc::clone));
-            let (tap, own) = Watch::new(Arc::clone(&config), clock, history, false);
+            let seen = (figures.clone(), hosted.recorder.as_ref());
+            let (tap, own) = Watch::new(Arc::clone(&config), clock, seen, false);
             watch = Some(own);
             let end = OwnEnd::new(config, &board, tap, hosted.recorder);
             let mut end = end.map_err(DriverError::Fault)?;

@@ -1,4 +1,8 @@
 //! A block of a history: the state before its first tick, and what each tick changed.
+#![allow(
+    clippy::cast_possible_truncation,
+    reason = "numbers are packed byte by byte, and fit where they come from"
+)]
 
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::Slot;

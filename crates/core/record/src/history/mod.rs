@@ -9,8 +9,9 @@ mod block;
 #[cfg(all(test, not(loom)))]
 #[allow(
     clippy::cast_possible_truncation,
-    clippy::cast_precision_loss,
-    reason = "tests: random words and small numbers"
+    clippy::cast_possible_wrap,
+    clippy::float_cmp,
+    reason = "tests: random words and small whole numbers"
 )]
 mod tests;
 

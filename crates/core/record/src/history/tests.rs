@@ -5,6 +5,9 @@ use proptest::prelude::*;
 use super::*;
 use crate::tests::{columns, open, read, table, ticks, written};
 
+/// True for the second of two ticks that is a goal.
+type IsGoal<'a> = &'a dyn Fn(&[Tick]) -> bool;
+
 /// The ticks between two times.
 fn between(history: &History, from: Nanos, to: Nanos) -> Vec<Tick> {
     let mut found = Vec::new();
@@ -107,7 +110,7 @@ proptest! {
             let all = |tick: &Tick| [tick.status, tick.stations[0], tick.stations[1]];
             all(&pair[0]).into_iter().zip(all(&pair[1])).any(|(a, b)| !is_stale(a) && is_stale(b))
         };
-        let goals: [(Goal, &dyn Fn(&[Tick]) -> bool); 2] =
+        let goals: [(Goal, IsGoal<'_>); 2] =
             [(Goal::Change(column), &is_changed), (Goal::Outage, &goes_stale)];
         for (goal, is_goal) in goals {
             let hits: Vec<u64> = ticks.windows(2).filter(|pair| is_goal(pair)).map(|pair| pair[1].number).collect();

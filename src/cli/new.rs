@@ -1,6 +1,6 @@
 //! `tickbus new FOLDER`: a folder that runs.
 
-use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
+use std::env::consts::{DLL_PREFIX, DLL_SUFFIX, EXE_SUFFIX};
 use std::fs;
 use std::io::{self, BufRead as _, IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
@@ -188,6 +188,7 @@ fn ask(arguments: &Arguments, kinds: &'static Kinds) -> Result<Answers, Failure>
         signals,
         counts_elements,
         command,
+        python: interpreter(),
         jar,
         c,
     })
@@ -274,6 +275,19 @@ fn listen(usual: &Address) -> Result<Address, Failure> {
             Ok(address) => return Ok(address),
             Err(why) => eprintln!("  {why}"),
         }
+    }
+}
+
+/// The interpreter beside this command, where pip has put both; otherwise the one on the path.
+fn interpreter() -> String {
+    let name = if cfg!(windows) { "python" } else { "python3" };
+    let beside = super::own_program().with_file_name(format!("{name}{EXE_SUFFIX}"));
+    // Without a folder it would be a file here.
+    let is_there = beside.is_absolute() && beside.is_file();
+    if is_there {
+        beside.display().to_string()
+    } else {
+        name.to_owned()
     }
 }
 

@@ -11,7 +11,7 @@ use tickbus::os::PseudoTerminal;
 
 const WORD: &str = "[[signal]]\nname = \"Life\"\naddress = \"%QW0\"\n";
 
-/// The behaviour of the far end.
+/// The far end of a line.
 #[derive(Clone, Copy, Default)]
 struct Far {
     /// Answers this unit.

@@ -1,4 +1,4 @@
-//! Facts about a serial port before it is opened: whether it exists, who may use it, and who does.
+//! Serial ports before they are opened: which exist, who may use them, and who does.
 
 use std::path::{Path, PathBuf};
 

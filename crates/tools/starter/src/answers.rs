@@ -160,6 +160,8 @@ pub struct Answers {
     pub counts_elements: bool,
     /// How this command is called, for the README.
     pub command: String,
+    /// How the interpreter is called that has the Python package.
+    pub python: String,
     /// The jar for Java, as far as it was found.
     pub jar: Option<String>,
     /// The folders of tickbus.h and of the library for C, as far as they were found.

@@ -202,7 +202,7 @@ fn runs(answers: &Answers) -> String {
             let jar = answers.jar.as_deref().unwrap_or("tickbus-0.1.0.jar");
             format!("java -cp {} Machine.java", word(jar))
         }
-        Language::Python => "python3 machine.py".to_owned(),
+        Language::Python => format!("{} machine.py", word(&answers.python)),
         Language::C => {
             let (include, library) = answers
                 .c

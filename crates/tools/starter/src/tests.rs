@@ -15,6 +15,7 @@ fn answers(plc: Plc, language: Language) -> Answers {
         signals: None,
         counts_elements: false,
         command: "tickbus".to_owned(),
+        python: "python3".to_owned(),
         jar: None,
         c: None,
     }

@@ -15,12 +15,11 @@ use crate::page::{self, PageError, Place, Shown};
 use tickbus_base::statistics::entries;
 use tickbus_base::time::{Clock, Monotonic, Nanos, Stop};
 use tickbus_driver::{Host, Watch};
-use tickbus_driver_cfg::{Config, Kinds, PageOptions};
+use tickbus_driver_cfg::{Config, Kinds};
 use tickbus_fieldbus::faults::{FaultStatus, Phase};
 use tickbus_fieldbus::{Link, LinkState, Role};
 use tickbus_net::Address;
 use tickbus_plc::Program;
-use tickbus_record as record;
 use tickbus_virtual_time::Controls;
 
 /// The interval at which the command checks its line.
@@ -114,10 +113,9 @@ pub(super) struct Job<'a> {
     pub(super) interval: Nanos,
 }
 
-/// Reads the driver.cfg, hosts the program, and reports on stdout.
-pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
-    let (title, format) = (job.title, &arguments.format);
-    let reading = Reading {
+/// Returns how the driver.cfg of this job is read.
+fn reading(job: &Job<'_>, arguments: &Hosting) -> Reading {
+    Reading {
         file: job.file.to_owned(),
         kinds: job.kinds,
         role: job.role,
@@ -128,7 +126,13 @@ pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
         record: arguments.record.clone(),
         page: arguments.page.clone(),
         edit: arguments.edit,
-    };
+    }
+}
+
+/// Reads the driver.cfg, hosts the program, and reports on stdout.
+pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
+    let (title, format) = (job.title, &arguments.format);
+    let reading = reading(&job, arguments);
     let config = match reading.read() {
         Ok(config) => config,
         Err(Wrong::Mistakes(mistakes)) => return format.refuse(title, &mistakes),

@@ -40,7 +40,7 @@ int main(int count, char **arguments) {
     /* Nothing of a file is taken that has mistakes, or in which more than the line differs. */
     write_file("third", "INTEGER");
     EXPECT(tb_reload(plc), TB_BAD_CONFIG);
-    EXPECT(strstr(tb_last_error(), ":9:8: ") != NULL, 1);
+    EXPECT(strstr(tb_last_error(), ":10:8: ") != NULL, 1);
     write_file("third", "UINT");
     EXPECT(tb_reload(plc), TB_UNSUPPORTED);
     EXPECT(strstr(tb_last_error(), "signal 1 \"Level\" has another type") != NULL, 1);

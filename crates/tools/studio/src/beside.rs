@@ -117,12 +117,13 @@ impl Inner {
     fn tabs(&self) -> Json {
         let desks = self.desks();
         let is_one = desks.len() == 1;
-        let studios = desks.iter().map(|(id, desk)| match is_one {
-            true => json!({ "path": "/studio", "name": "Studio" }),
-            false => json!({
-                "path": format!("/studio?driver={id}"),
-                "name": format!("Studio: {}", desk.name),
-            }),
+        let studios = desks.iter().map(|(id, desk)| {
+            if is_one {
+                json!({ "path": "/studio", "name": "Studio" })
+            } else {
+                let (path, name) = (format!("/studio?driver={id}"), &desk.name);
+                json!({ "path": path, "name": format!("Studio: {name}") })
+            }
         });
         let live = json!({ "path": "/", "name": "Live page" });
         std::iter::once(live).chain(studios).collect()

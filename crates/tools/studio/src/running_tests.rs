@@ -72,7 +72,7 @@ impl Fixture {
     }
 
     /// Edits one cell.
-    fn set(&self, at: Json, was: &str, to: &str) {
+    fn set(&self, at: &Json, was: &str, to: &str) {
         let edit = json!({ "set": { "at": at, "was": was, "to": to } });
         self.put("edit", &edit.to_string()).expect("an edit");
     }
@@ -95,7 +95,7 @@ fn an_edit_is_taken_by_the_line_that_runs_and_keeps_comments() {
     assert_eq!(line["runs"], json!(true));
     assert_eq!(line["isOld"], json!(false));
     assert_eq!(line["owner"]["name"], json!("Rig"));
-    fixture.set(json!(["fieldbus", "link"]), "first", "second");
+    fixture.set(&json!(["fieldbus", "link"]), "first", "second");
     assert_eq!(fixture.line()["isOld"], json!(true));
     assert_eq!(fixture.present(), "another");
     assert_eq!(fixture.put("line", "take"), Ok(()));
@@ -108,7 +108,7 @@ fn an_edit_is_taken_by_the_line_that_runs_and_keeps_comments() {
 #[test]
 fn what_needs_a_restart_is_said_before_and_refused() {
     let fixture = Fixture::new(FILE);
-    fixture.set(json!(["signal", 1, "type"]), "", "SINT");
+    fixture.set(&json!(["signal", 1, "type"]), "", "SINT");
     let told = json!(["signal 2 \"Valve\" has another type"]);
     assert_eq!(fixture.line()["owner"]["restart"], told);
     let (status, why) = fixture.put("line", "take").expect_err("another type");
@@ -121,7 +121,7 @@ fn what_needs_a_restart_is_said_before_and_refused() {
     );
     assert_eq!(fixture.line()["refused"], json!(why));
     // As a file with mistakes, whose first one is told with its place.
-    fixture.set(json!(["fieldbus", "max_age"]), "", "soon");
+    fixture.set(&json!(["fieldbus", "max_age"]), "", "soon");
     let (_, why) = fixture.put("line", "take").expect_err("a mistake");
     assert!(why.contains("driver.cfg:") && why.contains("soon"), "{why}");
     assert_eq!(fixture.line()["isOld"], json!(false), "mistakes are marked");
@@ -135,7 +135,7 @@ fn the_simulation_owns_the_line() {
         assert!(status == 409 && why.contains("owns this line"), "{why}");
     }
     fixture.driver.take().expect("open").close();
-    fixture.set(json!(["fieldbus", "link"]), "first", "third");
+    fixture.set(&json!(["fieldbus", "link"]), "first", "third");
     let (_, why) = fixture.put("line", "take").expect_err("closed");
     assert!(why.contains("has closed this driver"), "{why}");
     assert!(fixture.studio.take().and_then(Studio::close).is_none());
@@ -146,7 +146,7 @@ fn a_bus_in_step_with_the_simulation_takes_nothing() {
     let text = FILE.replace("link = \"first\"", "mode = \"stepped\"\nlink = \"step\"");
     let fixture = Fixture::new(&text);
     assert_eq!(fixture.line()["owner"]["restart"], json!([]));
-    fixture.set(json!(["fieldbus", "link"]), "step", "other");
+    fixture.set(&json!(["fieldbus", "link"]), "step", "other");
     let told = json!(["the bus runs in step with the simulation"]);
     assert_eq!(fixture.line()["owner"]["restart"], told);
     let (_, why) = fixture.put("line", "take").expect_err("in step");

@@ -17,10 +17,12 @@ pub(crate) fn show(
 ) -> Result<Option<Place>, PageError> {
     let Shown {
         config,
-        watch: _,
-        line: _,
-        read: _,
+        watch,
+        line,
+        read,
     } = shown;
+    // Nothing is watched or edited.
+    drop((watch, line, read));
     if config.page.is_none() {
         return Ok(None);
     }

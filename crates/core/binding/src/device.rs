@@ -141,7 +141,7 @@ impl<K> Device<K> {
         self.driver.is_over()
     }
 
-    /// A reload of the driver.cfg; it runs without a claim on the driver.
+    /// The parts of the driver that a reload of the driver.cfg needs; the reload runs without a claim on the driver.
     pub fn reload(&self) -> Reload {
         Reload::of(&self.driver)
     }

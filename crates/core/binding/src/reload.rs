@@ -7,7 +7,7 @@ use tickbus_driver_cfg::Config;
 
 use crate::Refusal;
 
-/// A reload of an open driver: taken while the driver is claimed, and used afterwards.
+/// The parts of an open driver that a reload needs: taken while the driver is claimed, and used afterwards.
 #[derive(Debug)]
 pub struct Reload {
     config: Arc<Config>,

@@ -59,7 +59,7 @@ pub struct Config {
     pub record: Option<record::Options>,
     /// The live page, if the file asks for one.
     pub page: Option<PageOptions>,
-    /// The surroundings of the file, for [reading it again](Self::read_again).
+    /// The way in which the file was read, for [reading it again](Self::read_again).
     pub origin: Origin,
 }
 

@@ -11,7 +11,7 @@ pub struct CommandLineEnd {
     pub moved: bool,
 }
 
-/// The surroundings that were read with the file.
+/// The command line and the tables that were read beside the file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Origin {
     pub(crate) asked: Option<CommandLineEnd>,

@@ -1,4 +1,4 @@
-//! The differences of another driver.cfg that an open driver cannot take without a restart of the simulation.
+//! The parts of another driver.cfg that an open driver cannot take without a restart of the simulation.
 
 use std::fmt::Display;
 

@@ -50,7 +50,7 @@ pub(super) struct Ends {
     pub(super) reports_events: bool,
 }
 
-/// The owner of a line, which ticks: a simulation, or a program at this end.
+/// The party that ticks: a simulation, or a program at this end.
 pub(super) trait Owner: Send + Sync {
     /// Opens the bus that `config` describes, and starts the other end if that is in this process.
     fn open(

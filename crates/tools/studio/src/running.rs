@@ -37,7 +37,7 @@ impl Running {
         self.config.path.clone()
     }
 
-    /// The changes that the file asks of the line. A file with mistakes asks for nothing: they are marked.
+    /// Returns the changes that the file asks of the line. A file with mistakes asks for nothing: they are marked.
     pub(crate) fn asked(&self) -> Asked {
         let Ok(next) = (self.read)() else {
             return Asked::default();

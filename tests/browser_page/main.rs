@@ -16,6 +16,7 @@ mod edited;
 mod live;
 mod run;
 mod studio;
+#[cfg(feature = "opcua")]
 mod studio_tags;
 mod taken;
 

@@ -245,9 +245,9 @@ fn what_is_typed_is_kept_and_reaches_no_other_signal() {
         "every object of JavaScript has a constructor"
     );
     // A text that was not applied yet, while the file changes.
-    browser.run(
-        "document.getElementById('text-box').open = true; document.getElementById('text').value += '# mine\\n';",
-    );
+    browser.run("document.getElementById('text-box').open = true");
+    browser.wait("document.getElementById('text').value !== ''");
+    browser.run("document.getElementById('text').value += '# mine\\n'");
     let theirs = format!("# theirs\n{text}");
     fs::write(studio.file(), &theirs).expect("there is room");
     browser.wait("tickbusStudio.file.text.startsWith('# theirs') && !tickbusStudio.isBusy");
@@ -355,6 +355,42 @@ fn the_studio_fits_a_phone_and_shows_names_as_text() {
     let folder = std::env::var_os("TICKBUS_SCREENSHOTS").map(PathBuf::from);
     shoot(&browser, folder.as_deref(), "studio_phone.png", true);
     assert_quiet(&browser);
+}
+
+/// Lists are read one after the other, and a file that goes is told until the next edit writes it again.
+#[test]
+fn several_lists_are_dropped_at_once_and_a_deleted_file_is_told() {
+    let text = "[driver]\nid = 1\nname = \"T\"\n\n[fieldbus]\nkind = \"socket\"\naddress = \"127.0.0.1:0\"\n\n[[signal]]\nname = \"A\"\naddress = \"%QX0.0\"\n";
+    let studio = Studio::new(Some(text));
+    let browser = open(&studio, 1200, 800);
+    browser.run(
+        "const given = new DataTransfer(); \
+         for (const [file, name, place] of [['a.csv', 'Valve', '%Q0.5'], ['b.csv', 'Pump', '%Q0.6'], ['c.csv', 'nonsense', '']]) { \
+           const list = place ? `Name;Path;Data Type;Logical Address\\n${name};T;Bool;${place}\\n` : name; \
+           given.items.add(new File([list], file)); } \
+         window.dispatchEvent(new DragEvent('drop', { dataTransfer: given, cancelable: true }));",
+    );
+    browser.wait("tickbusStudio.file.sheet.signals.length === 3 && document.getElementById('told').textContent.includes('c.csv')");
+    let told = browser.run("return document.getElementById('told').textContent");
+    let told = told.as_str().expect("a text");
+    assert!(
+        told.contains("imported 1 signals of a.csv") && told.contains("of b.csv"),
+        "{told}"
+    );
+    browser.wait("!tickbusStudio.isBusy");
+    fs::remove_file(studio.file()).expect("it is there");
+    browser.wait("document.getElementById('saved').textContent === 'gone'");
+    browser.wait(
+        "document.getElementById('told').textContent.includes('the next edit writes it again')",
+    );
+    assert!(!studio.file().exists());
+    fill(&browser, 0, "unit", "bar");
+    browser.wait("document.getElementById('saved').textContent === 'saved'");
+    assert!(
+        studio.text().contains("unit = \"bar\"\n"),
+        "{}",
+        studio.text()
+    );
 }
 
 /// A line to nobody: the page says why it is not up, finds the device, takes its address over, and is then content.

@@ -192,7 +192,7 @@ fn tags_of_an_asyncua_server_are_dragged_into_the_table_and_their_values_move() 
     signals(&browser, "signals.length === 3");
     let last = "name    = \"Inner.Level\"\naddress = \"%ID0\"\ntype    = \"UDINT\"\n";
     assert!(studio.text().ends_with(last), "{}", studio.text());
-    // Thousands of nodes have an end, which is told.
+    // Thousands of nodes have an end, and the page says so.
     open_folder(&browser, "Many");
     let note = browser.run(&format!(
         "return {}.querySelector('.tag-note').textContent",
@@ -300,7 +300,7 @@ fn a_plc_that_is_not_there_dies_or_refuses_says_what_to_do_and_blocks_nothing() 
     }
     browse(&browser);
     open_folder(&browser, "Cell");
-    // It dies while somebody looks into it: the item says so, and the page goes on.
+    // It dies while somebody looks into it: the item says so, and the rest of the page works.
     let mut plc = plc;
     plc.kill();
     browser.run(&format!("{}.click()", item("Inner")));

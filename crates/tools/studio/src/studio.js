@@ -94,8 +94,13 @@
     showMistakes(checked, state.checked.notes);
     showDiff(state.diff);
     explore.show(state.explored, mayEdit, checked.length > 0 || state.broken !== null);
-    if (!isTextChanged()) showText();
+    refreshText();
     showLine();
+  }
+
+  /** Shows the new text, where it is seen: half a megabyte in a field takes a browser longer than all the rest. */
+  function refreshText() {
+    if (get("text-box").open && !isTextChanged()) showText();
   }
 
   /** True if the field of the text has something that was not applied. */
@@ -136,6 +141,7 @@
     }
     if (bus.go(table, place)) return;
     get("text-box").open = true;
+    refreshText();
     const lines = get("text").value.split("\n").slice(0, Math.max(0, line - 1));
     const start = lines.reduce((sum, it) => sum + it.length + 1, 0);
     get("text").focus();
@@ -317,7 +323,7 @@
   });
 
   explore.begin(change);
-  tags.begin({ take: takeTags, give, mayEdit: () => mayEdit, chosen: () => cells.chosen, leave: () => change("tags", "close") });
+  tags.begin({ ask: (id) => room.ask(`/studio/tags/${id}`, {}), take: takeTags, give, mayEdit: () => mayEdit, chosen: () => cells.chosen, leave: () => change("tags", "close") });
   get("undo").addEventListener("click", () => change("undo"));
   get("redo").addEventListener("click", () => change("redo"));
   get("start").addEventListener("click", () => change("line", "start"));
@@ -340,6 +346,7 @@
     text.dataset.version = file.version;
     if (isDone) text.dataset.was = to;
   });
+  get("text-box").addEventListener("toggle", refreshText);
   get("text").addEventListener("keydown", (event) => {
     if (event.key === "Escape") showText();
   });

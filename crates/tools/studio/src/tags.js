@@ -34,7 +34,7 @@ const tags = (() => {
     const mine = turn;
     try {
       for (;;) {
-        const answer = await room.ask(`/studio/tags/${encodeURIComponent(id)}`, {});
+        const answer = await tell.ask(encodeURIComponent(id));
         const found = await answer.json();
         if (mine !== turn) return null;
         if (!answer.ok) return { error: found.text };

@@ -10,11 +10,12 @@ use tickbus_driver_cfg::{Kinds, keys};
 
 use crate::check::{Checked, check};
 use crate::document::body;
-use crate::edit::{Edit, Made, Shapes, Unmade, adopt, make};
+use crate::edit::{Edit, Made, Shapes, adopt, make};
 use crate::file::{OnDisk, Unwritten};
 use crate::history::History;
 use crate::news::News;
 use crate::sheet::Sheet;
+use crate::tables::Unmade;
 use crate::tags;
 
 /// The text of a file that is not there yet; the first edit writes it.

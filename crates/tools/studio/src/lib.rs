@@ -24,6 +24,7 @@ mod rename;
 mod running;
 mod sheet;
 mod site;
+mod tables;
 mod tags;
 mod take;
 

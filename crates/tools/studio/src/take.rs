@@ -8,12 +8,12 @@ use tickbus_image::signal::section::NAME_LIMIT;
 use tickbus_image::signal::{Area, DataType};
 use toml_edit::{DocumentMut, Item, Value};
 
-use crate::edit::{Unmade, list_mut, splice, table_at};
 use crate::layout;
 use crate::literal::cell;
 use crate::places::Step;
 use crate::propose::Free;
 use crate::rename::name_of;
+use crate::tables::{Unmade, list_mut, splice, table_at};
 
 /// A tag that becomes a signal.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]

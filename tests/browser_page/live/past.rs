@@ -18,7 +18,7 @@ const PICTURE: &str = "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 200 
 /// The text in the picture.
 const TOLD: &str = "pictures.all[0].root.querySelector('#told').textContent";
 
-/// The row of the level, as it is shown.
+/// The level that the page shows.
 fn level(browser: &Browser) -> Value {
     browser.run("return tickbusPage.value('Level')")
 }

@@ -7,7 +7,7 @@ use tickbus_fieldbus::Role;
 pub struct CommandLineEnd {
     /// The end. A file without a role serves both ends.
     pub role: Role,
-    /// True if another address will replace the file's; see [`Options::set_address`].
+    /// True if another address will replace the file's; see [`Options::set_address`](crate::Options::set_address).
     pub moved: bool,
 }
 

@@ -15,6 +15,9 @@ use crate::telegram::{BROADCAST, Telegram};
 /// How long the line is overheard at another rate.
 const TRIED: Nanos = Nanos::from_millis(200);
 
+/// One damaged piece among this many telegrams is none of the line: the first is often not whole.
+const FEW: usize = 10;
+
 /// The telegrams on a line.
 #[derive(Debug, Default)]
 struct Heard {

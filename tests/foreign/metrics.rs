@@ -139,16 +139,12 @@ impl Prometheus {
 
     /// The series that a query finds; a query with a mistake is a failure.
     fn query(&self, query: &str) -> Vec<serde_json::Value> {
-        let mut path = "query?query=".to_owned();
-        for byte in query.bytes() {
-            path.push_str(&format!("%{byte:02X}"));
-        }
+        let escaped = query.bytes().map(|byte| format!("%{byte:02X}"));
+        let path = format!("query?query={}", escaped.collect::<Vec<_>>().concat());
         let Some(answer) = self.get(&path) else {
             return Vec::new();
         };
-        if answer["errorType"] == "bad_data" {
-            panic!("{query}: {answer}");
-        }
+        assert_ne!(answer["errorType"], "bad_data", "{query}: {answer}");
         answer["data"]["result"]
             .as_array()
             .cloned()
@@ -179,7 +175,9 @@ fn dashboard() -> Vec<String> {
     let text = fs::read_to_string("docs/grafana/dashboard.json").expect("it is there");
     let dashboard: serde_json::Value = serde_json::from_str(&text).expect("JSON");
     let panels = dashboard["panels"].as_array().expect("a list");
-    let targets = panels.iter().flat_map(|panel| panel["targets"].as_array());
+    let targets = panels
+        .iter()
+        .filter_map(|panel| panel["targets"].as_array());
     let query = |target: &serde_json::Value| {
         let query = target["expr"].as_str().expect("a query");
         let query = query.replace("$driver", ".*").replace("$signal", ".*");

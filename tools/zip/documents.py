@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""documents FOLDER | documents FOLDER check: makes the pages in FOLDER those of a zip, or checks that each link in them leads
+"""documents.py FOLDER | documents.py FOLDER check: makes the pages in FOLDER those of a zip, or checks that each link in them leads
 somewhere.
 
 The pages are written for the repository. In a zip, pages for tickbus' own developers are left out, links to what the zip does not

@@ -71,7 +71,7 @@ impl Options {
             heard.damaged,
             listed(&heard.masters)
         );
-        if heard.damaged > 0 {
+        if heard.damaged * FEW > heard.telegrams {
             let next =
                 "check the termination at both ends, and the length of the line at this rate";
             examination.warn("line", "damaged", evidence, next);

@@ -12,7 +12,7 @@ use tickbus_base::time::{Clock, Monotonic, Nanos, Stop};
 use tickbus_base::toml_text::printable;
 use tickbus_driver_cfg::{Config, Kinds};
 use tickbus_fieldbus::examine::Examination;
-use tickbus_fieldbus::{Browsing, BusSetup, Listing, Tag, Wanted};
+use tickbus_fieldbus::{Browsing, Listing, Tag, Wanted};
 use tickbus_image::signal::Area;
 
 use crate::document::parsed;
@@ -204,18 +204,7 @@ struct Run {
 impl Run {
     fn serve(mut self, config: &Config) {
         let clock: Arc<dyn Clock> = Monotonic::shared();
-        let setup = BusSetup {
-            name: &config.name,
-            id: config.id,
-            folder: config.folder(),
-            role: config.role,
-            table: &config.table,
-            cycle: config.timing.cycle,
-            max_age: config.timing.max_age,
-            events: config.events,
-            clock: &clock,
-            hosted: None,
-        };
+        let setup = config.bus_setup(&clock, None);
         let stop = self.stop.clone();
         let mut examination = Examination::new(setup, Vec::new(), Nanos::ZERO, &stop);
         let mut visitor = Visitor {

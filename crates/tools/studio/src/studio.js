@@ -323,7 +323,7 @@
   });
 
   explore.begin(change);
-  tags.begin({ ask: (id) => room.ask(`/studio/tags/${id}`, {}), take: takeTags, give, mayEdit: () => mayEdit, chosen: () => cells.chosen, leave: () => change("tags", "close") });
+  tags.begin({ ask: (id) => room.ask(`${running.base}/tags/${id}`, {}), take: takeTags, give, mayEdit: () => mayEdit, chosen: () => cells.chosen, leave: () => change("tags", "close") });
   get("undo").addEventListener("click", () => change("undo"));
   get("redo").addEventListener("click", () => change("redo"));
   get("start").addEventListener("click", () => change("line", "start"));

@@ -212,7 +212,8 @@ fn the_page_shows_a_run_its_clients_and_its_variables() {
         assert_eq!(status, "409", "{told}");
         assert!(told.contains("have a client write it"), "{told}");
         let (_, metrics) = page.ask("GET /metrics", "");
-        assert!(metrics.contains("key=\"run.steps\"} 3\n"), "{metrics}");
+        let steps = "tickbus_run_steps_total{driver=\"";
+        assert!(metrics.contains(steps), "{metrics}");
         assert!(
             metrics.contains("signal=\"ratio\",station=\"machine\",unit=\"\"} 2.5\n"),
             "{metrics}"

@@ -82,6 +82,11 @@ impl Recorded {
         tick
     }
 
+    /// Returns the number of ticks in the recording from before the last reset.
+    pub(super) fn before(&self) -> u64 {
+        self.begin.0
+    }
+
     /// Begins to count again, one nanosecond after the last tick: two ticks at the same time would be one in VCD.
     pub(super) fn restart(&mut self) {
         let (number, time) = self.last;

@@ -20,6 +20,9 @@ pub struct View {
     pub now: Nanos,
     /// The number of the tick, from 1; 0 before the first.
     pub tick: u64,
+    /// The number of ticks that the recording has from before the last reset, after which [`tick`](Self::tick) counts
+    /// from 1 again.
+    pub recorded_before: u64,
     /// The time of the tick, on the simulation's clock.
     pub time: Nanos,
     /// The status of the exchange.
@@ -62,6 +65,7 @@ impl View {
             stations: vec![station; stations].into(),
             now: Nanos::ZERO,
             tick: 0,
+            recorded_before: 0,
             time: Nanos::ZERO,
             code: Code::Stale,
             counters: TickCounters::default(),

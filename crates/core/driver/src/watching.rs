@@ -93,6 +93,7 @@ impl Driver {
         }
         view.now = now;
         view.tick = self.counters.ticks;
+        view.recorded_before = self.recorded.before();
         view.time = time;
         view.code = code;
         view.counters = self.counters;

@@ -1,6 +1,6 @@
 //! The past of one exhibit: its history, the faults and the states of its line, as JSON.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::fmt::Write as _;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -48,15 +48,27 @@ pub(crate) struct Archive {
 #[derive(Debug, Default)]
 struct Notes {
     marks: VecDeque<Mark>,
-    /// The faults as last seen: number, phase, beginnings.
-    seen: Vec<(u32, Phase, u64)>,
+    seen: Vec<Seen>,
     lines: VecDeque<LineNote>,
+}
+
+/// A fault as last seen.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    id: u32,
+    phase: Phase,
+    begun: u64,
+    /// The number of ticks in the history from before the reset that preceded the fault.
+    before: u64,
 }
 
 /// A fault has begun or ended.
 #[derive(Clone, Debug)]
 struct Mark {
+    /// The number of the tick in the history.
     tick: u64,
+    /// The time of the tick, once it was asked for.
+    at: Option<Nanos>,
     name: String,
     text: String,
     begins: bool,
@@ -96,35 +108,64 @@ impl Archive {
         self.notes.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Notes the faults that have begun or ended.
-    pub(crate) fn note_faults(&self, faults: &[FaultStatus]) {
+    /// Notes the faults that have begun or ended. Their ticks count from the last reset, and the history has `before`
+    /// ticks from before it.
+    pub(crate) fn note_faults(&self, faults: &[FaultStatus], before: u64) {
+        let last = self.history.span().map_or(0, |span| span.last.0);
         let mut notes = self.notes();
         let Notes { marks, seen, .. } = &mut *notes;
         for fault in faults {
-            let now = (fault.id, fault.phase, fault.begun);
-            let place = seen.iter_mut().find(|(id, ..)| *id == fault.id);
-            let is_new = if let Some(known) = place {
-                std::mem::replace(known, now) != now
-            } else {
-                seen.push(now);
-                fault.begun > 0
+            let mut now = Seen {
+                id: fault.id,
+                phase: fault.phase,
+                begun: fault.begun,
+                before,
             };
-            if !is_new || fault.begun == 0 {
+            let place = seen.iter().position(|known| known.id == fault.id);
+            let known = place.map(|place| seen[place]);
+            // Its ticks count from the reset before its first beginning.
+            if let Some(known) = known.filter(|known| known.begun > 0) {
+                now.before = known.before;
+            }
+            match place {
+                Some(place) => seen[place] = now,
+                None => seen.push(now),
+            }
+            let begun = known.map_or(0, |known| known.begun);
+            let is_active = fault.phase == Phase::Active;
+            let has_begun = fault.begun != begun;
+            let has_turned = known.is_some_and(|known| known.phase != fault.phase);
+            if fault.begun == 0 || !(has_begun || has_turned) {
                 continue;
             }
-            if marks.len() == MOST {
-                marks.pop_front();
-            }
-            marks.push_back(Mark {
-                tick: fault.tick,
+            let tick = match fault.tick {
+                // A reset has ended it; there may be no tick since then.
+                0 if before > now.before => before + 1,
+                0 => last + 1,
+                tick => now.before + tick,
+            };
+            let mark = Mark {
+                tick,
+                at: None,
                 name: fault.name.clone(),
                 text: match fault.name.strip_prefix(FORCE) {
                     Some(_) => fault.what.clone(),
                     None if fault.name.is_empty() => format!("{}: {}", fault.kind, fault.what),
                     None => format!("{}: {}", fault.name, fault.what),
                 },
-                begins: fault.phase == Phase::Active,
+                begins: is_active,
+            };
+            // A fault that is over already began as well; when is not known, so both are in the tick of its end.
+            let begin = (has_begun && !is_active).then(|| Mark {
+                begins: true,
+                ..mark.clone()
             });
+            for mark in begin.into_iter().chain([mark]) {
+                if marks.len() == MOST {
+                    marks.pop_front();
+                }
+                marks.push_back(mark);
+            }
         }
         if seen.len() > MOST {
             seen.drain(..MOST / 2);
@@ -177,14 +218,12 @@ impl Archive {
             .iter()
             .map(|(begin, end)| (millis(*begin), end.map(millis)))
             .collect();
-        let marks = self.notes().marks.clone();
+        let marks = self.marks_within(span);
         let marks: Vec<_> = marks
             .iter()
-            .filter(|mark| span.is_some_and(|span| (span.first.0..=span.last.0).contains(&mark.tick)))
             .filter_map(|mark| {
-                let tick = self.history.at(Moment::Tick(mark.tick))?;
                 Some(json!({
-                    "ms": millis(tick.time), "tick": mark.tick, "text": mark.text, "begins": mark.begins,
+                    "ms": millis(mark.at?), "tick": mark.tick, "text": mark.text, "begins": mark.begins,
                 }))
             })
             .collect();
@@ -201,6 +240,28 @@ impl Archive {
             "marks": marks,
         })
         .to_string()
+    }
+
+    /// The marks of the ticks that the history has, with their times.
+    fn marks_within(&self, span: Option<Span>) -> Vec<Mark> {
+        let Some(Span { first, last, .. }) = span else {
+            return Vec::new();
+        };
+        let is_kept = |mark: &Mark| (first.0..=last.0).contains(&mark.tick);
+        let mut marks: Vec<Mark> = self.notes().marks.iter().cloned().collect();
+        marks.retain(is_kept);
+        // Each time is looked for once, without the lock, since that decodes a part of the history.
+        let mut found = BTreeMap::new();
+        for mark in marks.iter_mut().filter(|mark| mark.at.is_none()) {
+            let find = || self.history.at(Moment::Tick(mark.tick)).map(|it| it.time);
+            mark.at = *found.entry(mark.tick).or_insert_with(find);
+        }
+        if !found.is_empty() {
+            for mark in &mut self.notes().marks {
+                mark.at = mark.at.or_else(|| *found.get(&mark.tick)?);
+            }
+        }
+        marks
     }
 
     /// The faults that are on at a tick.
@@ -345,3 +406,6 @@ impl Archive {
         Some(found.unwrap_or_else(|| json!({ "tick": null })).to_string())
     }
 }
+
+#[cfg(test)]
+mod tests;

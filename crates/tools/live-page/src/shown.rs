@@ -154,7 +154,8 @@ impl Shown {
         let link = self.watch.link();
         if let Some(archive) = &self.archive {
             archive.note_line(&link, self.watch.clock().now());
-            archive.note_faults(&self.watch.faults());
+            let before = self.watch.view(|view| view.recorded_before);
+            archive.note_faults(&self.watch.faults(), before);
         }
         let is_other = (link.state, link.cause) != (self.link.state, self.link.cause)
             || (link.state == LinkState::Opening && link.reason != self.link.reason)

@@ -52,6 +52,21 @@ fn episode(driver: &mut Driver, slots: &mut [Slot], ticks: i64) -> Vec<(Code, Na
 }
 
 #[test]
+fn a_watch_knows_how_many_ticks_the_recording_has_from_before_a_reset() {
+    let (mut driver, mut slots) = open(MIRROR, "[page]\n");
+    let mut watch = driver.watch();
+    for episodes in 0..3 {
+        episode(&mut driver, &mut slots, 12);
+        watch.ask(false);
+        driver.exchange(Nanos::from_millis(12), &mut slots);
+        assert!(watch.update());
+        let place = watch.view(|view| (view.recorded_before, view.tick));
+        assert_eq!(place, (episodes * 13, 13));
+        driver.reset(&mut slots).expect("its line is its own");
+    }
+}
+
+#[test]
 fn a_stepped_driver_repeats_its_first_episode_exactly() {
     let fault =
         "[[fault]]\nkind = \"stuck\"\nsignal = \"from\"\nvalue = 77\nat = \"5ms\"\nfor = \"3ms\"\n";

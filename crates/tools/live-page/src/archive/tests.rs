@@ -1,0 +1,125 @@
+//! The marks of faults.
+
+use tickbus_image::signal::{DataType, Signal};
+use tickbus_record::{Column, Columns, ValueKind};
+
+use super::*;
+
+/// An archive of twenty ticks, one each millisecond, with one signal.
+fn archive() -> Archive {
+    let table = SignalTable {
+        signals: vec![Signal::new("a", Area::Output, 0, DataType::Byte)],
+        ..SignalTable::default()
+    };
+    let columns = Columns {
+        driver: "x".to_owned(),
+        role: "device".to_owned(),
+        stations: Vec::new(),
+        columns: vec![Column {
+            name: "a".to_owned(),
+            is_edges: false,
+            kind: ValueKind::of(DataType::Byte, false),
+            address: None,
+            data_type: Some(DataType::Byte),
+            unit: None,
+            station: String::new(),
+        }],
+    };
+    let history = History::new(columns.clone(), 1 << 20);
+    for number in 1..=20 {
+        let time = Nanos::from_millis(i64::try_from(number).expect("few"));
+        history.push(&Tick {
+            number,
+            time,
+            ..Tick::new(&columns)
+        });
+    }
+    let facts = Facts {
+        table,
+        reads: None,
+        is_fail_safe: false,
+        is_sampled: false,
+        has_bits: true,
+    };
+    Archive::new(Arc::new(history), facts)
+}
+
+fn forced(id: u32, phase: Phase, begun: u64, tick: u64) -> FaultStatus {
+    FaultStatus {
+        id,
+        name: "forced: a".to_owned(),
+        kind: "stuck",
+        what: "\"a\" is stuck at 5".to_owned(),
+        phase,
+        begun,
+        since: Nanos::ZERO,
+        tick,
+    }
+}
+
+/// The ticks of the marks that the bar of time shows, with their times and whether the fault begins.
+fn marks(archive: &Archive) -> Vec<(u64, f64, bool)> {
+    let overview: serde_json::Value = serde_json::from_str(&archive.overview()).expect("right");
+    let marks = overview["marks"].as_array().expect("a list");
+    let mark = |mark: &serde_json::Value| {
+        let (tick, ms) = (mark["tick"].as_u64(), mark["ms"].as_f64());
+        let begins = mark["begins"].as_bool();
+        Some((tick?, ms?, begins?))
+    };
+    marks
+        .iter()
+        .map(|it| mark(it).expect("as documented"))
+        .collect()
+}
+
+#[test]
+fn a_fault_after_a_reset_is_where_the_history_has_it() {
+    let archive = archive();
+    archive.note_faults(&[forced(1, Phase::Active, 1, 3)], 0);
+    // A reset after the tenth tick ends the force, in no tick, and the ticks count from 1 again.
+    let over = forced(1, Phase::Over, 1, 0);
+    archive.note_faults(&[over.clone(), forced(2, Phase::Waiting, 0, 0)], 10);
+    archive.note_faults(&[over, forced(2, Phase::Active, 1, 4)], 10);
+    let expected = [(3, 3.0, true), (11, 11.0, false), (14, 14.0, true)];
+    assert_eq!(marks(&archive), expected);
+    let is_forced = |tick: u64| !archive.faults_at(tick).is_empty();
+    assert_eq!(
+        [2, 3, 4, 10, 11, 13, 14, 20].map(is_forced),
+        [false, true, true, true, false, false, true, true]
+    );
+}
+
+#[test]
+fn a_force_that_a_reset_ends_was_on_until_then() {
+    let archive = archive();
+    archive.note_faults(&[forced(1, Phase::Active, 1, 3)], 0);
+    // The page looks before the first tick after the reset.
+    archive.note_faults(&[forced(1, Phase::Over, 1, 0)], 0);
+    let is_forced = |tick: u64| !archive.faults_at(tick).is_empty();
+    assert_eq!([2, 3, 20, 21].map(is_forced), [false, true, true, false]);
+}
+
+#[test]
+fn a_fault_that_is_over_before_the_page_looks_is_marked_and_found() {
+    let archive = archive();
+    archive.note_faults(&[forced(1, Phase::Waiting, 0, 0)], 0);
+    archive.note_faults(&[forced(1, Phase::Over, 1, 7)], 0);
+    archive.note_faults(&[forced(1, Phase::Over, 1, 7)], 0);
+    assert_eq!(marks(&archive), [(7, 7.0, true), (7, 7.0, false)]);
+    let found = archive.jump("fault", true, 1).expect("known");
+    assert!(found.contains("\"tick\":7"), "{found}");
+    assert!(archive.faults_at(7).is_empty());
+}
+
+#[test]
+fn a_mark_keeps_its_time() {
+    let archive = archive();
+    archive.note_faults(&[forced(1, Phase::Active, 1, 5)], 0);
+    // The recorder may not have the tick yet.
+    archive.note_faults(&[forced(2, Phase::Active, 1, 21)], 0);
+    assert_eq!(marks(&archive), [(5, 5.0, true)]);
+    let times = |archive: &Archive| -> Vec<Option<Nanos>> {
+        archive.notes().marks.iter().map(|mark| mark.at).collect()
+    };
+    assert_eq!(times(&archive), [Some(Nanos::from_millis(5)), None]);
+}

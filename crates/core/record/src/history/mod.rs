@@ -212,33 +212,27 @@ impl History {
                 ),
             }
         };
+        // First the number of steps: a copy of the state at each would take far longer.
         let mut cursor = Cursor::new(&block, &self.kinds);
-        let mut found = None;
+        let mut steps = 0;
         while cursor.step() {
             let (number, time) = (cursor.tick.number, cursor.tick.time);
-            let is_past = match moment {
-                Moment::Tick(asked) => number > asked,
-                Moment::After(asked) => {
-                    found = Some(cursor.tick.clone());
-                    if number > asked {
-                        return found;
-                    }
-                    continue;
-                }
-                Moment::Time(asked) => time > asked,
+            let is_within = match moment {
+                Moment::Tick(asked) | Moment::After(asked) => number <= asked,
+                Moment::Time(asked) => time <= asked,
             };
-            if is_past && found.is_some() {
+            if !is_within {
+                // The first tick of all has none before it.
+                steps += usize::from(steps == 0 || matches!(moment, Moment::After(_)));
                 break;
             }
-            match &mut found {
-                Some(found) => found.clone_from(&cursor.tick),
-                none => *none = Some(cursor.tick.clone()),
-            }
-            if is_past {
-                break;
-            }
+            steps += 1;
         }
-        found
+        let mut cursor = Cursor::new(&block, &self.kinds);
+        for _ in 0..steps {
+            cursor.step();
+        }
+        (steps > 0).then_some(cursor.tick)
     }
 
     /// The changes of a column between two times, both included: first its value at `from`, or at the oldest tick.

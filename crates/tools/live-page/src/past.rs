@@ -56,7 +56,10 @@ impl Past {
         let thread = thread.spawn(move || {
             // Doors may be left after the end, so the end of the queue is no signal.
             while let Ok(Some((path, answer))) = taken.recv() {
-                answer.give(document(&model, &path));
+                // Who scrubs or has left does not wait for the moments in between.
+                if answer.is_wanted() {
+                    answer.give(document(&model, &path));
+                }
             }
         })?;
         let door = Door(wishes.clone());

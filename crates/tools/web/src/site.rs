@@ -139,6 +139,11 @@ impl<T> Answer<T> {
         (Self(sender), receiver)
     }
 
+    /// True while somebody waits for the answer.
+    pub fn is_wanted(&self) -> bool {
+        !self.0.is_closed()
+    }
+
     /// Answers.
     pub fn give(self, answer: T) {
         // A requester that has gone does not mind.

@@ -84,6 +84,55 @@ fn the_page_steps_back_to_the_edge_while_the_present_goes_on() {
     assert_quiet(&browser);
 }
 
+/// Another driver beside the lead, whose answers are made here.
+const OTHER: &str = "const lead = plant.drivers[0]; \
+    const other = { ...lead, id: 2, name: 'Other', moment: null }; \
+    other.signals = lead.signals.map((it) => ({ ...it, driver: other })); \
+    plant.drivers.push(other); \
+    const real = room.ask; \
+    window.asked = []; \
+    const found = { tick: 7, ms: 1.5 }; \
+    const state = { ...found, status: 0, stations: [], faults: [], line: null, values: [] }; \
+    room.ask = async (path) => { \
+      if (!path.startsWith('/history/2/')) return real(path); \
+      window.asked.push(path.replace(/last\\/0\\/.*/, 'last/0')); \
+      return { ok: true, json: async () => (path.includes('/last/') ? found : state) }; }; \
+    bar.begin({ say() {}, shown() {}, chosen: () => other.signals[0] });";
+
+#[test]
+fn a_jump_to_a_change_of_another_driver_shows_the_very_tick_of_it() {
+    let machine = filled();
+    let browser = open(&machine, 1280, 800);
+    wait_shown(&browser, "Level", "250.00mm");
+    browser.run(OTHER);
+    browser.run("document.getElementById('goal').value = 'signal'; await bar.jump(false)");
+    browser.wait("plant.drivers[1].moment?.tick === 7");
+    // The lead's tick at that time may be an earlier one.
+    let asked = json!(["/history/2/last/0", "/history/2/tick/7"]);
+    assert_eq!(browser.run("return asked"), asked);
+    browser.run("await bar.jump(false)");
+    let again = browser.run("return asked[3]");
+    assert_eq!(again, "/history/2/tick/7/since/7");
+}
+
+#[test]
+fn drivers_that_have_left_take_the_past_with_them() {
+    let machine = filled();
+    let browser = open(&machine, 1280, 800);
+    wait_shown(&browser, "Level", "250.00mm");
+    browser.run("document.getElementById('pause').click()");
+    browser.wait("bar.moment && document.body.classList.contains('is-past')");
+    browser.run(
+        "const empty = { layout: -1, full: true, time_ms: 0, past: {}, signals: { drivers: [] }, line: { drivers: [] } }; \
+         plant.hear(JSON.stringify(empty)); bar.redraw()",
+    );
+    browser.wait("!document.body.classList.contains('is-past')");
+    assert_eq!(
+        browser.run("return document.getElementById('link').textContent"),
+        "live"
+    );
+}
+
 #[test]
 fn an_outage_is_found_and_the_time_before_it_is_saved() {
     let mut machine = Machine::rig();

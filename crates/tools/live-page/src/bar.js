@@ -29,30 +29,33 @@ const bar = (() => {
 
   const path = (driver, rest) => `/history/${driver.id}/${rest}`;
 
-  /** The place of a moment in another driver's time. */
-  const placeOf = (driver, place) => (driver === lead || !moment ? place : `at/${moment.ms + (offsets.get(driver.id) ?? 0)}`);
+  /** The place of the shown moment in another driver's time. */
+  const placeIn = (driver) => `at/${moment.ms + (offsets.get(driver.id) ?? 0)}`;
 
   /** Requests a moment of one driver, and shows it. */
   async function fetchOne(driver, place, isStep) {
     const since = driver.moment ? `/since/${driver.moment.tick}` : "";
-    const answer = await room.ask(path(driver, placeOf(driver, place) + since));
+    const answer = await room.ask(path(driver, place + since));
     if (!answer.ok) throw new Error((await answer.json()).text);
     const state = await answer.json();
     if (!plant.drivers.includes(driver)) return null;
     return () => plant.showPast(driver, state, isStep);
   }
 
-  /** Shows a moment of the lead: `at/MS`, `tick/NUMBER` or `after/NUMBER`. While one is on its way, the newest one waits. */
-  async function show(place, isStep = false) {
+  /**
+   * Shows a moment of the lead: `at/MS`, `tick/NUMBER` or `after/NUMBER`, and `own` of another driver, `{ driver, place }`:
+   * the lead may have no tick at that time. While one is on its way, the newest one waits.
+   */
+  async function show(place, isStep = false, own = null) {
     if (!lead) return;
-    wanted = { place, isStep };
+    wanted = { place, isStep, own };
     if (isBusy) return;
     isBusy = true;
     if (!moment) {
       offsets = new Map(plant.drivers.filter(({ past }) => past).map((driver) => [driver.id, driver.past.last - lead.past.last]));
     }
     while (wanted) {
-      const { place, isStep } = wanted;
+      const { place, isStep, own } = wanted;
       wanted = null;
       const begun = performance.now();
       try {
@@ -61,7 +64,8 @@ const bar = (() => {
         first();
         moment = { ms: lead.moment.ms, tick: lead.moment.tick };
         const others = plant.drivers.filter((driver) => driver !== lead && driver.past);
-        for (const shown of await Promise.all(others.map((driver) => fetchOne(driver, "", isStep)))) shown?.();
+        const placeOf = (driver) => (driver === own?.driver ? own.place : placeIn(driver));
+        for (const shown of await Promise.all(others.map((driver) => fetchOne(driver, placeOf(driver), isStep)))) shown?.();
       } catch (error) {
         act.say(`The past cannot be shown: ${error.message}`, true);
         break;
@@ -116,7 +120,7 @@ const bar = (() => {
       act.say("");
       // In the lead's time, if the signal is another driver's.
       if (driver === lead) await show(`tick/${found.tick}`, true);
-      else await show(`at/${found.ms - (offsets.get(driver.id) ?? driver.past.last - lead.past.last)}`, true);
+      else await show(`at/${found.ms - (offsets.get(driver.id) ?? driver.past.last - lead.past.last)}`, true, { driver, place: `tick/${found.tick}` });
     } catch {
       act.say("Nobody answers; look at the values when the page is live again.", true);
     }
@@ -185,15 +189,18 @@ const bar = (() => {
   function redraw() {
     if (!plant.drivers.includes(lead)) {
       lead = plant.drivers.find(({ past }) => past) ?? null;
-      moment = null;
+      if (moment) {
+        leave();
+        act.say("The drivers were opened again or have changed; the page is live again.");
+      }
       overview = { outages: [], marks: [] };
       looked = -Infinity;
     }
     lead ??= plant.drivers.find(({ past }) => past) ?? null;
     get("bar").hidden = !lead?.past;
+    document.body.classList.toggle("is-past", Boolean(moment));
     if (!lead?.past) return;
     const { first, last, isCut } = lead.past;
-    document.body.classList.toggle("is-past", Boolean(moment));
     range.min = first;
     range.max = last;
     const at = moment?.ms ?? last;

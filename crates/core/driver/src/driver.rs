@@ -16,7 +16,7 @@ use super::line::Line;
 use super::recording::Recorded;
 use super::shape::Shape;
 use super::station::Station;
-use super::statistics::{BusName, Figures, ProgramCounters, TickFigures};
+use super::statistics::{BusFacts, Figures, ProgramCounters, TickFigures};
 use super::tap::Tap;
 use super::tick::Tick;
 use super::tick_counters::TickTimes;
@@ -56,7 +56,7 @@ pub struct Driver {
     pub(super) board: Arc<FaultBoard>,
     pub(super) swallowed: SwallowedSignals,
     pub(super) program_counters: ProgramCounters,
-    pub(super) bus_name: BusName,
+    pub(super) bus_facts: BusFacts,
     pub(super) recorder: Option<Recorder>,
     /// The ticks that the recording has so far.
     pub(super) recorded: Recorded,
@@ -149,7 +149,7 @@ impl Driver {
             swallowed: self.swallowed.clone(),
             program: self.program_counters.clone(),
             record: recorder.map(|recorder| Arc::clone(recorder.counters())),
-            bus: self.bus_name.clone(),
+            bus: self.bus_facts.clone(),
         }
     }
 

@@ -15,7 +15,7 @@ use tickbus_fieldbus::{
 };
 
 use super::DriverError;
-use super::statistics::BusName;
+use super::statistics::BusFacts;
 use super::supervise::BusThread;
 
 /// A handle on the line of an open driver, for any thread. A handle that outlives its driver keeps nothing open.
@@ -45,7 +45,7 @@ pub(super) struct Ends {
     pub(super) name: String,
     pub(super) clock: Arc<dyn Clock>,
     pub(super) status: LinkStatus,
-    pub(super) bus_name: BusName,
+    pub(super) bus_facts: BusFacts,
     /// True if changes and writes of the peer can be reported one by one.
     pub(super) reports_events: bool,
 }
@@ -248,7 +248,7 @@ impl Shared {
         };
         ends.status.limit().set(config.timing.max_age);
         let watchdog = self.owner.take(&config);
-        ends.bus_name.set(config.bus.kind());
+        ends.bus_facts.set(&config);
         open.other_end = other_end;
         let mut port = ends.equipped(port.for_next_bus(watchdog), &config);
         port.opening("the line has other settings");

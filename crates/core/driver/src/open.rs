@@ -21,7 +21,7 @@ use super::real_time;
 use super::recording::{Recorded, recorder};
 use super::shape::Shape;
 use super::station::Station;
-use super::statistics::{BusName, Counters, ProgramCounters};
+use super::statistics::{BusFacts, Counters, ProgramCounters};
 use super::tick_counters::TickTimes;
 use super::{Driver, DriverError, Exchange, SlotMap, TickCounters};
 use tickbus_driver_cfg::Config;
@@ -69,8 +69,8 @@ impl Driver {
         let program_counters = ProgramCounters::new(counters_of(program.as_ref()));
         let line = (&status, &board, &swallowed);
         let opened = (bus, program);
-        let bus_name = BusName::new(config.bus.kind());
-        let counters = (&program_counters, &bus_name);
+        let bus_facts = BusFacts::of(&config);
+        let counters = (&program_counters, &bus_facts);
         let line = start(&config, opened, bus_end, times, line, counters)?;
         let stations = (0..config.table.stations.len())
             .map(|index| Station::new(&config.table, index, areas))
@@ -98,7 +98,7 @@ impl Driver {
             board,
             swallowed,
             program_counters,
-            bus_name,
+            bus_facts,
             recorded: Recorded::default(),
             tap: None,
             config,
@@ -170,7 +170,7 @@ pub(super) fn start(
     image: BusEnd,
     (clock, time): (&Arc<dyn Clock>, &Arc<Manual>),
     (status, board, swallowed): (&LinkStatus, &Arc<FaultBoard>, &SwallowedSignals),
-    (counters, bus_name): (&ProgramCounters, &BusName),
+    (counters, bus_facts): (&ProgramCounters, &BusFacts),
 ) -> Result<BusHandle, DriverError> {
     let (role, watchdog) = (config.role, config.timing.watchdog);
     let port = Port::new(image, Arc::clone(clock), role, watchdog, status.clone())
@@ -180,7 +180,7 @@ pub(super) fn start(
         name: config.name.clone(),
         clock: Arc::clone(clock),
         status: status.clone(),
-        bus_name: bus_name.clone(),
+        bus_facts: bus_facts.clone(),
         reports_events: true,
     };
     Ok(match bus {

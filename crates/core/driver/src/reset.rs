@@ -100,7 +100,7 @@ impl Driver {
             bus_end,
             times,
             line,
-            (&self.program_counters, &self.bus_name),
+            (&self.program_counters, &self.bus_facts),
         )?;
         // The present tick and line end only now, so that a failure leaves them as they are.
         self.end_tick(slots);

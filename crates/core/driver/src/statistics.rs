@@ -44,24 +44,32 @@ impl ProgramCounters {
     }
 }
 
-/// The kind of bus that a line has at present.
+/// The settings that a line has at present and others look at: the kind of bus, and the watchdog of the ticks.
 #[derive(Clone, Debug)]
-pub(super) struct BusName(Arc<Mutex<&'static str>>);
+pub(super) struct BusFacts(Arc<Mutex<(&'static str, Option<Nanos>)>>);
 
-impl BusName {
-    pub(super) fn new(kind: &'static str) -> Self {
-        Self(Arc::new(Mutex::new(kind)))
+impl BusFacts {
+    pub(super) fn of(config: &Config) -> Self {
+        Self(Arc::new(Mutex::new(Self::facts(config))))
     }
 
-    pub(super) fn set(&self, kind: &'static str) {
-        *self.lock() = kind;
+    pub(super) fn set(&self, config: &Config) {
+        *self.lock() = Self::facts(config);
     }
 
-    pub(super) fn get(&self) -> &'static str {
-        *self.lock()
+    fn facts(config: &Config) -> (&'static str, Option<Nanos>) {
+        (config.bus.kind(), config.timing.watchdog)
     }
 
-    fn lock(&self) -> MutexGuard<'_, &'static str> {
+    pub(super) fn kind(&self) -> &'static str {
+        self.lock().0
+    }
+
+    pub(super) fn watchdog(&self) -> Option<Nanos> {
+        self.lock().1
+    }
+
+    fn lock(&self) -> MutexGuard<'_, (&'static str, Option<Nanos>)> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -74,7 +82,7 @@ pub(super) struct Figures {
     pub(super) swallowed: SwallowedSignals,
     pub(super) program: ProgramCounters,
     pub(super) record: Option<Arc<RecorderCounters>>,
-    pub(super) bus: BusName,
+    pub(super) bus: BusFacts,
 }
 
 /// The figures that only the ticks of a driver know, copied.

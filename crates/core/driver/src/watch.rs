@@ -84,7 +84,12 @@ impl Watch {
 
     /// Returns the kind of bus that the line has at present.
     pub fn bus_kind(&self) -> &'static str {
-        self.figures.bus.get()
+        self.figures.bus.kind()
+    }
+
+    /// Returns how long the ticks can pause at present before the peer gets fail-safe values; `None` for any time.
+    pub fn watchdog(&self) -> Option<Nanos> {
+        self.figures.bus.watchdog()
     }
 
     /// Returns the area that this end writes.

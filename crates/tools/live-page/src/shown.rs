@@ -99,7 +99,7 @@ impl Shown {
         let (table, writes) = (&config.table, watch.writes());
         let silence = watch.silence();
         // The driver's watchdog does not watch a program behind its bus: the program's scans have their own limit.
-        let watchdog = config.timing.watchdog.filter(|_| watch.is_driver());
+        let watchdog = watch.watchdog().filter(|_| watch.is_driver());
         // After a simulation has stopped, the other end gets fail-safe values.
         let has_stopped = watchdog.is_some_and(|limit| silence > limit);
         let mut is_new = false;
@@ -116,7 +116,7 @@ impl Shown {
         }
         codec.take(table, &values);
         watch.view(|view| {
-            let count = |station| line::is_stale_now(station, silence, config.timing.max_age);
+            let count = |station| line::is_stale_now(station, silence, watch.max_age());
             let now: Vec<bool> = view.stations.iter().map(count).collect();
             *is_turn |= now != *stale;
             *stale = now;

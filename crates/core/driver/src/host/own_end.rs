@@ -340,7 +340,7 @@ mod tests {
             swallowed,
             program: crate::statistics::ProgramCounters::new(None),
             record: None,
-            bus: crate::statistics::BusName::new(config.bus.kind()),
+            bus: crate::statistics::BusFacts::of(&config),
         };
         let (config, board) = (Arc::new(config), Arc::clone(&figures.board));
         let shared = Arc::clone(&config);

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use crate::DriverError;
 use crate::line::{Ends, FreeLine, Line, Owner};
 use crate::real_time;
-use crate::statistics::{BusName, Counters, Figures, ProgramCounters};
+use crate::statistics::{BusFacts, Counters, Figures, ProgramCounters};
 use crate::supervise::{BusThread, panic_text};
 use crate::watch::Watch;
 use tickbus_base::statistics::Statistics;
@@ -149,7 +149,7 @@ impl HostThread {
             swallowed: hosted.swallowed.clone(),
             program: ProgramCounters::new(Some(Arc::clone(&counters) as _)),
             record: hosted.recorder.as_ref().map(|it| Arc::clone(it.counters())),
-            bus: BusName::new(config.bus.kind()),
+            bus: BusFacts::of(config),
         };
         let mut watch = None;
         if is_own {
@@ -225,7 +225,7 @@ fn ends_of(name: &str, counters: &HostCounters, figures: &Figures) -> Ends {
         name: name.to_owned(),
         clock: Arc::clone(&counters.wall),
         status: figures.status.clone(),
-        bus_name: figures.bus.clone(),
+        bus_facts: figures.bus.clone(),
         reports_events: false,
     }
 }

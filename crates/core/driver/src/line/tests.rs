@@ -186,3 +186,20 @@ fn a_driver_leaves_the_program_at_its_other_end_for_a_plc_and_a_reset_keeps_that
     assert!(!machine.0.statistics().contains("plc.scans"));
     machine.0.close();
 }
+
+#[test]
+fn a_watch_has_the_limits_that_the_line_has_taken() {
+    let with = |more: &str| {
+        let text = text("device", "line-limits");
+        text.replace("cycle = \"1ms\"\n", &format!("cycle = \"1ms\"\n{more}"))
+    };
+    let (mut driver, _) = opened(&with("watchdog = \"1s\"\n"));
+    let watch = driver.watch();
+    assert_eq!(watch.watchdog(), Some(Nanos::from_secs(1)));
+    let line = driver.line().expect("free");
+    let next = config(&with("watchdog = \"2s\"\nmax_age = \"7s\"\n"));
+    assert!(line.take(next).expect("it can"));
+    assert_eq!(watch.watchdog(), Some(Nanos::from_secs(2)));
+    assert_eq!(watch.max_age(), Nanos::from_secs(7));
+    driver.close();
+}

@@ -26,6 +26,9 @@ const PATIENCE: Duration = Duration::from_secs(4);
 /// The most answers that nobody has fetched.
 const KEPT: usize = 50;
 
+/// How long an answer waits for the page that has asked. It asks again at once: after this time it has gone.
+const FRESH: Nanos = Nanos::from_secs(10);
+
 /// A folder for a page: its contents, or why there are none.
 type Found = Result<Json, String>;
 
@@ -39,11 +42,22 @@ pub(crate) struct Tags {
 #[derive(Debug, Default)]
 struct State {
     run: Option<Present>,
+    /// The settings that the present connection, or the last one, was made with.
+    settings: String,
     /// The number of connections so far.
     runs: u64,
     wanted: VecDeque<String>,
     current: Option<String>,
-    found: BTreeMap<String, Found>,
+    found: BTreeMap<String, Kept>,
+    /// The number of times that somebody ended the connection.
+    ends: u64,
+}
+
+/// An answer that waits for its page.
+#[derive(Debug)]
+struct Kept {
+    at: Nanos,
+    found: Found,
 }
 
 /// The present connection.
@@ -51,8 +65,6 @@ struct State {
 struct Present {
     number: u64,
     stop: Stop,
-    /// The settings that it was made with.
-    settings: String,
 }
 
 impl State {
@@ -72,7 +84,25 @@ impl State {
         if self.found.len() >= KEPT {
             self.found.clear();
         }
-        self.found.insert(id, found);
+        let at = Monotonic::shared().now();
+        self.found.insert(id, Kept { at, found });
+    }
+
+    /// Takes the answer about a folder. One that nobody has fetched for long is about another time, or another PLC.
+    fn fetch(&mut self, id: &str) -> Option<Found> {
+        let kept = self.found.remove(id)?;
+        (Monotonic::shared().now() - kept.at < FRESH).then_some(kept.found)
+    }
+
+    /// Ends the present connection, and all that is asked of it.
+    fn end(&mut self) {
+        if let Some(run) = self.run.take() {
+            run.stop.stop();
+        }
+        self.current = None;
+        self.wanted.clear();
+        self.found.clear();
+        self.ends += 1;
     }
 }
 
@@ -88,13 +118,19 @@ impl Tags {
     ) -> Option<Found> {
         let mut state = self.lock();
         let mut rest = PATIENCE;
+        if state.settings != settings {
+            // What is known is about another PLC, perhaps.
+            state.end();
+            settings.clone_into(&mut state.settings);
+            self.changed.notify_all();
+        }
+        let ends = state.ends;
         loop {
-            if let Some(found) = state.found.remove(id) {
-                return Some(found);
+            if state.ends != ends {
+                return Some(Err("browsing was stopped; browse again".to_owned()));
             }
-            if let Some(run) = state.run.take_if(|run| run.settings != settings) {
-                run.stop.stop();
-                state.current = None;
+            if let Some(found) = state.fetch(id) {
+                return Some(found);
             }
             if !state.is_asked(id) {
                 state.wanted.push_back(id.to_owned());
@@ -117,7 +153,6 @@ impl Tags {
                 state.run = Some(Present {
                     number: state.runs,
                     stop: stop.clone(),
-                    settings: settings.to_owned(),
                 });
                 let run = Run {
                         tags: Arc::clone(self),
@@ -133,12 +168,12 @@ impl Tags {
                 state = self.lock();
             }
             let waited = self.changed.wait_timeout_while(state, rest, |state| {
-                !state.found.contains_key(id) && state.run.is_some()
+                !state.found.contains_key(id) && state.run.is_some() && state.ends == ends
             });
             let (after, timeout) = waited.unwrap_or_else(PoisonError::into_inner);
             state = after;
             if timeout.timed_out() {
-                return state.found.remove(id);
+                return state.fetch(id);
             }
             // Others may have had their answers: this one waits again, but not for ever.
             rest = rest.saturating_sub(Duration::from_millis(200));
@@ -147,9 +182,8 @@ impl Tags {
 
     /// Ends the connection.
     pub(crate) fn close(&self) {
-        if let Some(run) = &self.lock().run {
-            run.stop.stop();
-        }
+        self.lock().end();
+        self.changed.notify_all();
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
@@ -230,13 +264,11 @@ impl Drop for Run {
             // Another connection has taken over the questions.
             return;
         }
-        if self.stop.is_stopped() {
-            state.fail("browsing was stopped");
-        } else if !self.why.is_empty() {
-            state.fail(&self.why);
-        } else {
+        if self.why.is_empty() {
             // What was asked at the last moment gets another connection.
             state.current = None;
+        } else {
+            state.fail(&self.why);
         }
         drop(state);
         self.tags.changed.notify_all();
@@ -254,10 +286,11 @@ struct Visitor<'a> {
 
 impl Browsing for Visitor<'_> {
     fn wanted(&mut self) -> Wanted {
+        let mut state = self.tags.lock();
+        // Under the lock: the questions may be another connection's already.
         if self.stop.is_stopped() {
             return Wanted::End;
         }
-        let mut state = self.tags.lock();
         if let Some(id) = state.wanted.pop_front() {
             state.current = Some(id.clone());
             return Wanted::Folder(id);
@@ -317,5 +350,43 @@ impl Visitor<'_> {
             "area": &area.to_string()[1..],
             "why": why.map(|why| printable(why)),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn kept(age: Nanos) -> Kept {
+        Kept {
+            at: Monotonic::shared().now() - age,
+            found: Ok(json!("the tags of another time")),
+        }
+    }
+
+    #[test]
+    fn an_answer_that_nobody_has_fetched_is_not_shown_later() {
+        let mut state = State::default();
+        state.found.insert(String::new(), kept(FRESH));
+        assert_eq!(state.fetch(""), None);
+        state.keep(String::new(), Ok(json!("new")));
+        assert_eq!(state.fetch(""), Some(Ok(json!("new"))));
+    }
+
+    #[test]
+    fn an_answer_is_not_shown_as_that_of_other_settings() {
+        let tags = Arc::<Tags>::default();
+        let settings = "settings = \"of another PLC\"";
+        settings.clone_into(&mut tags.lock().settings);
+        tags.lock().found.insert(String::new(), kept(Nanos::ZERO));
+        let open = |settings| tags.open("", settings, Path::new("driver.cfg"), &Kinds::LOOPBACK);
+        let found = open("[fieldbus]\n");
+        let why = found.expect("at once").expect_err("it has mistakes");
+        assert!(why.contains("have mistakes"), "{why}");
+        // Nor after somebody has ended the connection.
+        settings.clone_into(&mut tags.lock().settings);
+        tags.lock().found.insert(String::new(), kept(Nanos::ZERO));
+        tags.close();
+        assert!(open(settings).expect("at once").is_err());
     }
 }

@@ -54,12 +54,20 @@ pub(crate) fn follow(document: &mut DocumentMut, was: &str, to: &str) -> String 
             count => places.push(format!("{count} {many}")),
         }
     }
+    // The signals of an axis have names, too.
+    let has_axes = document.contains_key("axis");
     if let Some(bus) = document
         .get_mut("fieldbus")
         .and_then(Item::as_table_like_mut)
     {
         for key in ["at", "nodes"] {
-            if bus.get_mut(key).is_some_and(|item| name.keys(item)) {
+            let Some(item) = bus.get_mut(key) else {
+                continue;
+            };
+            if !has_axes {
+                name.make_room(item);
+            }
+            if name.keys(item) {
                 places.push(format!("fieldbus.{key}"));
             }
         }
@@ -154,6 +162,16 @@ impl Renaming<'_> {
         let is_edge = ["rises", "falls"].contains(&words) && rest.starts_with(' ');
         let is_comparison = OPERATORS.iter().any(|sign| words.starts_with(sign));
         (is_edge || is_comparison).then(|| format!("{}{rest}", self.to))
+    }
+
+    /// Removes the line with the new name, which a signal that is gone has left: it would become this signal's.
+    fn make_room(self, item: &mut Item) {
+        if let Some(table) = item.as_table_like_mut()
+            && self.was != self.to
+            && table.contains_key(self.was)
+        {
+            table.remove(self.to);
+        }
     }
 
     /// Renames a key of a table of names.

@@ -41,7 +41,7 @@ pub(crate) fn take(
 ) -> Result<String, Unmade> {
     let mut free = Free::of(document, station);
     let map = [Step::Key("fieldbus".to_owned()), Step::Key("at".to_owned())];
-    let known: BTreeSet<String> = table_at(document, &map)?
+    let mut known: BTreeSet<String> = table_at(document, &map)?
         .iter()
         .map(|(_, item)| cell(item))
         .collect();
@@ -52,11 +52,12 @@ pub(crate) fn take(
     let neighbour = neighbour.or_else(|| signals.get(index)).cloned();
     let (mut new, mut lines, mut was_known) = (Vec::new(), Vec::new(), 0);
     for tag in tags {
-        if known.contains(&tag.at) {
+        let (data_type, area) = kind_of(tag)?;
+        // A tag can be in two folders.
+        if !known.insert(tag.at.clone()) {
             was_known += 1;
             continue;
         }
-        let (data_type, area) = kind_of(tag)?;
         let name = free_name(tag, &names);
         let address = free.take(area, data_type.width());
         let mut pairs: Vec<(String, Value)> = vec![

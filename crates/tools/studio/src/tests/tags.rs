@@ -144,3 +144,29 @@ fn tags_are_browsed_while_the_signals_have_mistakes() {
     let config = tickbus_driver_cfg::Config::parse("driver.cfg", &text, &KINDS);
     assert!(config.is_ok(), "{config:?}");
 }
+
+#[test]
+fn a_new_name_does_not_take_the_place_that_a_removed_signal_has_left() {
+    let at = "\n[fieldbus.at]\nGone = \"ns=2;s=G\"\n\"Belt on\" = \"ns=2;s=B\" # here\n";
+    let mut fixture = Fixture::new(&format!("{FILE}{at}"));
+    let edit = set(&json!(["signal", 0, "name"]), "Belt on", "Gone");
+    assert_eq!(fixture.edit(edit), Ok(()));
+    let (_, after) = fixture
+        .text()
+        .split_once("[fieldbus.at]\n")
+        .map(|(a, b)| (a.to_owned(), b.to_owned()))
+        .expect("it is there");
+    assert_eq!(after, "Gone      = \"ns=2;s=B\" # here\n");
+}
+
+#[test]
+fn a_tag_of_two_folders_becomes_one_signal() {
+    let mut fixture = Fixture::new(&format!("{FILE}{AT}"));
+    let both = json!([
+        tag("A", "ns=2;s=A", "INT", "Q"),
+        tag("Also", "ns=2;s=A", "INT", "Q")
+    ]);
+    assert_eq!(fixture.edit(take(&both, 1)), Ok(()));
+    let told = fixture.desk.json()["told"].clone();
+    assert_eq!(told, "added signal \"A\"; 1 tag was a signal already");
+}

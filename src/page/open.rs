@@ -118,12 +118,13 @@ impl Open {
             )));
         }
         let running = Running {
+            id: member.id(),
             kinds: config.kinds,
             config,
             line,
             read,
         };
-        let seat = self.studios.join(member.id(), running);
+        let seat = self.studios.join(running);
         seat.map_err(|why| PageError::WrongInput(format!("{file} cannot be edited: {why}")))
     }
 }

@@ -49,13 +49,13 @@ impl Studios {
         Arc::new(Beside(Arc::clone(&self.0)))
     }
 
-    /// Opens the studio of a driver, which the live page has under the number `id`.
+    /// Opens the studio of a driver.
     ///
     /// # Errors
     ///
     /// The file cannot be read.
-    pub fn join(&self, id: i32, running: Running) -> Result<Seat, String> {
-        let name = running.config.name.clone();
+    pub fn join(&self, running: Running) -> Result<Seat, String> {
+        let (id, name) = (running.id, running.config.name.clone());
         let studio = Studio::of_running(running, Arc::clone(&self.0.live))?;
         let site = studio.site();
         self.0.desks().insert(id, Desk { name, site });

@@ -1,5 +1,7 @@
 //! The file that is edited: its text, what was done to it, and what others did.
 
+use std::collections::hash_map::RandomState;
+use std::hash::{BuildHasher as _, Hasher as _};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -45,6 +47,13 @@ pub(crate) struct Desk {
 /// A file that is missed this often is gone: editors replace files in two steps.
 const GONE: u8 = 2;
 
+/// The number of the first state, which is another one for each desk: a page that is open while a simulation is started
+/// again has the numbers of the desk before, and must not take this file for that one.
+fn first_version() -> u64 {
+    // Numbers of JavaScript are exact to 53 bits.
+    (RandomState::new().build_hasher().finish() >> 16) + 1
+}
+
 /// Why a request was refused, with the status of HTTP.
 pub(crate) type Refusal = (u16, String);
 
@@ -68,7 +77,7 @@ impl Desk {
             first,
             text,
             history: History::default(),
-            version: 1,
+            version: first_version(),
             checked: Checked::default(),
             unsaved: None,
             told: String::new(),

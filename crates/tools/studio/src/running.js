@@ -5,9 +5,16 @@
 const running = (() => {
   const get = (id) => document.getElementById(id);
 
-  /** Where the requests for the file go: a room with several drivers has the number of the driver in the page's address. */
-  const driver = new URLSearchParams(location.search).get("driver");
-  const base = driver ? `/studio/of/${encodeURIComponent(driver)}` : "/studio";
+  /**
+   * The number of the driver: from the page's address, or else from the first state. The page keeps to it, because another
+   * driver that joins the room may become the first.
+   */
+  let driver = new URLSearchParams(location.search).get("driver");
+
+  /** Keeps to the driver whose file the page shows. */
+  function keep(line) {
+    if (!driver && line.owner) driver = String(line.owner.id);
+  }
 
   /** The driver of this file, of those on the live page. */
   const mine = (drivers) => (driver ? drivers.find(({ id }) => String(id) === driver) : drivers[0]);
@@ -29,5 +36,11 @@ const running = (() => {
     get("restart").replaceChildren(...items.map((text) => Object.assign(document.createElement("li"), { textContent: text })));
   }
 
-  return { base, mine, show };
+  return {
+    /** Where the requests for the file go. */
+    get base() { return driver ? `/studio/of/${encodeURIComponent(driver)}` : "/studio"; },
+    keep,
+    mine,
+    show,
+  };
 })();

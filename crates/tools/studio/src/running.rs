@@ -13,6 +13,8 @@ pub type Read = Box<dyn Fn() -> Result<Config, String> + Send + Sync>;
 
 /// A driver that runs in this process, and the file that it was opened from.
 pub struct Running {
+    /// The number that the live page has the driver under.
+    pub id: i32,
     /// The settings that the driver was opened with.
     pub config: Arc<Config>,
     /// The kinds of bus that its file can name.
@@ -37,13 +39,18 @@ impl Running {
         self.config.path.clone()
     }
 
+    /// Returns the present settings of the line.
+    pub(crate) fn present(&self) -> Arc<Config> {
+        let present = self.line.as_ref().and_then(Line::config);
+        present.unwrap_or_else(|| Arc::clone(&self.config))
+    }
+
     /// Returns the changes that the file asks of the line. A file with mistakes asks for nothing: they are marked.
     pub(crate) fn asked(&self) -> Asked {
         let Ok(next) = (self.read)() else {
             return Asked::default();
         };
-        let present = self.line.as_ref().and_then(Line::config);
-        let present = present.unwrap_or_else(|| Arc::clone(&self.config));
+        let present = self.present();
         let mut restart = present.needs_restart(&next);
         let is_other = !restart.is_empty() || !present.has_line_of(&next);
         if is_other && self.line.is_none() {
@@ -73,7 +80,7 @@ impl Running {
             "runs": true,
             "refused": refused,
             "isOld": asked.is_other,
-            "owner": { "id": self.config.id, "name": self.config.name, "restart": asked.restart },
+            "owner": { "id": self.id, "name": self.config.name, "restart": asked.restart },
         })
     }
 }

@@ -37,6 +37,7 @@ impl Fixture {
         let config = read().expect("no mistakes");
         let driver = Driver::open(config, Monotonic::shared()).expect("opens");
         let running = Running {
+            id: 7,
             config: Arc::clone(driver.config()),
             kinds: &Kinds::LOOPBACK,
             line: driver.line(),
@@ -151,4 +152,46 @@ fn a_bus_in_step_with_the_simulation_takes_nothing() {
     assert_eq!(fixture.line()["owner"]["restart"], told);
     let (_, why) = fixture.put("line", "take").expect_err("in step");
     assert!(why.contains("restart the simulation"), "{why}");
+}
+
+#[test]
+fn what_another_door_gives_the_line_is_seen() {
+    let fixture = Fixture::new(FILE);
+    fixture.set(&json!(["fieldbus", "link"]), "first", "second");
+    let studio = fixture.studio.as_ref().expect("open");
+    let state: Json = serde_json::from_str(&studio.state("0")).expect("JSON");
+    assert_eq!(state["line"]["isOld"], json!(true));
+    // As tickbus_reload of the C interface does.
+    let line = fixture.driver.as_ref().and_then(Driver::line);
+    let next = Config::load(&fixture.path(), &Kinds::LOOPBACK).expect("no mistakes");
+    assert!(line.expect("free").take(next).expect("it can"));
+    let seen = state["state"].as_str().expect("a text");
+    let state: Json = serde_json::from_str(&studio.state(seen)).expect("JSON");
+    assert_eq!(state["line"]["isOld"], json!(false), "{state}");
+}
+
+#[test]
+fn a_page_does_not_take_the_file_of_another_studio_for_its_own() {
+    let (one, other) = (
+        Fixture::new(FILE),
+        Fixture::new(&FILE.replace("Lamp", "Light")),
+    );
+    let studio = |of: &Fixture, seen: &str| -> Json {
+        let studio = of.studio.as_ref().expect("open");
+        serde_json::from_str(&studio.state(seen)).expect("JSON")
+    };
+    let seen = studio(&one, "0");
+    let there = studio(&other, seen["state"].as_str().expect("a text"));
+    assert_eq!(there["sheet"]["signals"][0]["name"], json!("Light"));
+    // The text that the page has is not written over the other file.
+    let text = json!({ "text": { "was": seen["version"], "to": seen["text"] } });
+    let (status, _) = other
+        .put("edit", &text.to_string())
+        .expect_err("not its text");
+    assert_eq!(status, 409);
+    let exact = 1_u64 << 53;
+    assert!(
+        seen["version"].as_u64().expect("a number") < exact,
+        "as JavaScript has it"
+    );
 }

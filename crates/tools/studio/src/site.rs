@@ -83,6 +83,8 @@ struct Room {
     refused_at: u64,
     /// The version of the file with which the line was started.
     started: u64,
+    /// The settings of a simulation's line when it was looked at last.
+    present: Option<Arc<Config>>,
     /// The versions at which a simulation's line was compared with the file, and the result.
     asked: Option<((u64, u64), Asked)>,
     explored: Explored,
@@ -138,6 +140,7 @@ impl Studio {
             refused: String::new(),
             refused_at: 0,
             started: 0,
+            present: None,
             asked: None,
             explored: Explored::default(),
         };
@@ -314,6 +317,14 @@ impl Shared {
         if room.refused_at != room.desk.version() {
             // Such as mistakes that are corrected now.
             room.refused.clear();
+        }
+        if let Owner::Simulation(running) = &self.owner {
+            let present = running.present();
+            let before = room.present.replace(Arc::clone(&present));
+            if before.is_some_and(|before| !Arc::ptr_eq(&before, &present)) {
+                // The simulation's program can give its line other settings, too.
+                room.turns += 1;
+            }
         }
         let version = format!("{}.{}", room.desk.version(), room.turns);
         if seen == version {

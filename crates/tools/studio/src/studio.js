@@ -65,6 +65,7 @@
     const state = whole(news);
     file = state;
     seen = state.state;
+    running.keep(state.line);
     document.title = `${state.name} – tickbus studio`;
     get("title").textContent = state.name;
     get("path").textContent = state.path;
@@ -233,7 +234,8 @@
       // What is typed next is for the new name, which the place in the device follows.
       signal.name = to;
       const { at } = file.sheet;
-      if (to && Object.hasOwn(at, of) && !Object.hasOwn(at, to)) {
+      const isAlone = !file.sheet.signals.some((it) => it !== signal && [of, to].includes(it.name));
+      if (to && isAlone && Object.hasOwn(at, of) && !Object.hasOwn(at, to)) {
         at[to] = at[of];
         delete at[of];
       }

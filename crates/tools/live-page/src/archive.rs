@@ -8,11 +8,13 @@ use serde_json::json;
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::faults::{FaultStatus, Phase};
 use tickbus_fieldbus::{Link, LinkState};
-use tickbus_image::signal::{Area, SignalTable};
+use tickbus_image::signal::{Area, SignalTable, Slot};
 use tickbus_record::{Goal, History, Moment, Span, Tick};
 
 use crate::codec::Codec;
 use crate::sheet::{ChangeJson, FAIL_SAFE, FORCED, Row, STALE};
+
+mod forces;
 
 /// The most faults and states of the line that are remembered.
 const MOST: usize = 10_000;
@@ -49,6 +51,8 @@ pub(crate) struct Archive {
 struct Notes {
     marks: VecDeque<Mark>,
     seen: Vec<Seen>,
+    /// By the numbers of the faults.
+    forces: BTreeMap<u32, Force>,
     lines: VecDeque<LineNote>,
 }
 
@@ -62,6 +66,13 @@ struct Seen {
     before: u64,
 }
 
+/// A signal, by its index, and the value that it is forced to.
+#[derive(Clone, Copy, Debug)]
+struct Force {
+    signal: usize,
+    value: Slot,
+}
+
 /// A fault has begun or ended.
 #[derive(Clone, Debug)]
 struct Mark {
@@ -69,6 +80,7 @@ struct Mark {
     tick: u64,
     /// The time of the tick, once it was asked for.
     at: Option<Nanos>,
+    force: Option<Force>,
     name: String,
     text: String,
     begins: bool,
@@ -108,12 +120,27 @@ impl Archive {
         self.notes.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Notes that the fault with this number forces a signal to a value. The history has what the simulation itself
+    /// wrote meanwhile, and the PLC got this.
+    pub(crate) fn note_force(&self, fault: u32, signal: usize, value: Slot) {
+        let forces = &mut self.notes().forces;
+        forces.insert(fault, Force { signal, value });
+        if forces.len() > MOST {
+            forces.pop_first();
+        }
+    }
+
     /// Notes the faults that have begun or ended. Their ticks count from the last reset, and the history has `before`
     /// ticks from before it.
     pub(crate) fn note_faults(&self, faults: &[FaultStatus], before: u64) {
         let last = self.history.span().map_or(0, |span| span.last.0);
         let mut notes = self.notes();
-        let Notes { marks, seen, .. } = &mut *notes;
+        let Notes {
+            marks,
+            seen,
+            forces,
+            ..
+        } = &mut *notes;
         for fault in faults {
             let mut now = Seen {
                 id: fault.id,
@@ -147,6 +174,7 @@ impl Archive {
             let mark = Mark {
                 tick,
                 at: None,
+                force: forces.get(&fault.id).copied(),
                 name: fault.name.clone(),
                 text: match fault.name.strip_prefix(FORCE) {
                     Some(_) => fault.what.clone(),
@@ -248,11 +276,23 @@ impl Archive {
             return Vec::new();
         };
         let is_kept = |mark: &Mark| (first.0..=last.0).contains(&mark.tick);
-        let mut marks: Vec<Mark> = self.notes().marks.iter().cloned().collect();
+        let mut marks = self.timed_marks();
         marks.retain(is_kept);
+        marks
+    }
+
+    /// All marks, with their times as far as the history has them.
+    fn timed_marks(&self) -> Vec<Mark> {
+        let Some(Span { last, .. }) = self.history.span() else {
+            return Vec::new();
+        };
+        let mut marks: Vec<Mark> = self.notes().marks.iter().cloned().collect();
         // Each time is looked for once, without the lock, since that decodes a part of the history.
         let mut found = BTreeMap::new();
-        for mark in marks.iter_mut().filter(|mark| mark.at.is_none()) {
+        for mark in marks
+            .iter_mut()
+            .filter(|mark| mark.at.is_none() && mark.tick <= last.0)
+        {
             let find = || self.history.at(Moment::Tick(mark.tick)).map(|it| it.time);
             mark.at = *found.entry(mark.tick).or_insert_with(find);
         }
@@ -277,13 +317,25 @@ impl Archive {
         on
     }
 
+    /// True for a signal that this end writes.
+    fn is_written(&self, signal: usize) -> bool {
+        let area = self.facts.table.signals[signal].area;
+        self.facts.reads.is_some_and(|reads| reads != area)
+    }
+
     /// The rows of a tick.
     fn rows(&self, tick: &Tick, faults: &[Mark]) -> Vec<Row> {
         let table = &self.facts.table;
         // The tables are consistent after a panic as well: every tick fills them again.
         let mut codec = self.codec.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut values = tick.values.clone();
+        for Force { signal, value } in faults.iter().filter_map(|mark| mark.force) {
+            if self.is_written(signal) {
+                values[signal] = value;
+            }
+        }
         if self.facts.has_bits {
-            codec.take(table, &tick.values);
+            codec.take(table, &values);
         }
         let rows = table.signals.iter().enumerate().map(|(index, signal)| {
             let status = tick.stations.get(signal.station).unwrap_or(&tick.status);
@@ -311,7 +363,7 @@ impl Archive {
             let edges =
                 self.edges[index].map_or(0, |column| tick.values[column].real() as u64 as u32);
             Row {
-                slot: tick.values[index],
+                slot: values[index],
                 bits: if self.facts.has_bits {
                     codec.bits(signal, index)
                 } else {

@@ -159,7 +159,7 @@ fn trends(archive: &Archive, path: &str) -> Option<Document> {
         let station = can_be_stale.then_some(signal.station);
         let points = archive.history.trend(index, station, (from, to));
         let value = |slot| Number::of(signal, slot).real();
-        let points: Vec<TrendPoint> = points;
+        let points: Vec<TrendPoint> = archive.with_forces(index, points, to);
         let mut points: Vec<(Nanos, f64)> = points
             .iter()
             .map(|(at, slot)| (*at, slot.map_or(f64::NAN, value)))

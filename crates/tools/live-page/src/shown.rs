@@ -322,6 +322,9 @@ impl Exhibit for Shown {
             text: mistake.to_string(),
         };
         let fault = self.watch.force(index, value).map_err(refused)?;
+        if let Some(archive) = &self.archive {
+            archive.note_force(fault, index, value);
+        }
         self.forced.insert(index, Force { fault, value });
         // End the old fault together with the new one, so that the signal is held throughout.
         if let Some(before) = before

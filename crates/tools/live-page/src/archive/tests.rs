@@ -36,7 +36,7 @@ fn archive() -> Archive {
     }
     let facts = Facts {
         table,
-        reads: None,
+        reads: Some(Area::Input),
         is_fail_safe: false,
         is_sampled: false,
         has_bits: true,
@@ -122,4 +122,44 @@ fn a_mark_keeps_its_time() {
         archive.notes().marks.iter().map(|mark| mark.at).collect()
     };
     assert_eq!(times(&archive), [Some(Nanos::from_millis(5)), None]);
+}
+
+#[test]
+fn a_forced_value_takes_the_place_of_the_one_that_the_simulation_wrote() {
+    let archive = archive();
+    let slot = Slot::from_real;
+    let ms = Nanos::from_millis;
+    let trend = |from, to| {
+        let own = archive.history.trend(0, None, (ms(from), ms(to)));
+        archive.with_forces(0, own, ms(to))
+    };
+    let own = archive.history.trend(0, None, (ms(0), ms(30)));
+    assert_eq!(trend(0, 30), own);
+    let first = own[0];
+    archive.note_force(1, 0, slot(5.0));
+    archive.note_force(2, 0, slot(6.0));
+    archive.note_faults(&[forced(1, Phase::Active, 1, 3)], 0);
+    let to_six = FaultStatus {
+        what: "\"a\" is stuck at 6".to_owned(),
+        ..forced(2, Phase::Active, 1, 8)
+    };
+    // The second takes the place of the first in one tick.
+    archive.note_faults(&[forced(1, Phase::Over, 1, 8), to_six.clone()], 0);
+    let over = FaultStatus {
+        phase: Phase::Over,
+        tick: 12,
+        ..to_six
+    };
+    archive.note_faults(&[over], 0);
+    let (five, six) = (Some(slot(5.0)), Some(slot(6.0)));
+    let whole = [first, (ms(3), five), (ms(8), six), (ms(12), first.1)];
+    assert_eq!(trend(0, 30), whole);
+    assert_eq!(trend(5, 10), [(ms(5), five), (ms(8), six)]);
+    assert_eq!(trend(15, 30), [(ms(15), first.1)]);
+    let value = |tick: u64| {
+        let state = archive.state(Moment::Tick(tick), None).expect("a tick");
+        let state: serde_json::Value = serde_json::from_str(&state).expect("right");
+        state["values"][0][1].as_f64()
+    };
+    assert_eq!([2, 3, 8, 12].map(value), [0.0, 5.0, 6.0, 0.0].map(Some));
 }

@@ -108,6 +108,14 @@ fn a_force_is_known_in_the_past_and_found() {
     let flags = |tick: u64| page.get(&format!("/history/1/tick/{tick}"))["values"][0][4].clone();
     assert_eq!(flags(tick), 2, "forced");
     assert_eq!(flags(tick - 1), Value::Null);
+    // The PLC got the forced value, whatever the simulation wrote.
+    let value = |tick: u64| page.get(&format!("/history/1/tick/{tick}"))["values"][0][1].clone();
+    assert_eq!(value(tick), 5);
+    let trend = page.get("/trend/1/0")["values"].clone();
+    assert!(
+        trend.as_array().expect("a trend").contains(&5.0.into()),
+        "{trend}"
+    );
     let state = page.get(&format!("/history/1/tick/{tick}"));
     assert!(
         state["faults"][0].as_str().expect("a text").contains("in"),

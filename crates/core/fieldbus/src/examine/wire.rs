@@ -252,6 +252,11 @@ impl Wire {
         sent.map_err(|error| WireEnd::of(&error))
     }
 
+    /// The time in which a peer must answer.
+    pub const fn patience(&self) -> Nanos {
+        self.patience
+    }
+
     /// The end of the time for an answer to a question that is asked now.
     pub fn deadline(&self) -> Nanos {
         self.clock.now() + self.patience

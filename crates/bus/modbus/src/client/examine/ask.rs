@@ -98,17 +98,24 @@ impl Talk {
             Frame::Rtu => rtu::append(unit, &mut request, copy),
             Frame::Serial { coding, apart, .. } => {
                 self.wire.pause(apart);
-                let now = self.wire.now();
-                // Drops a late answer to an earlier question, here and below.
-                while self.wire.receive(&mut self.inbox, now).is_ok() {}
+                let (now, end) = (self.wire.now(), self.wire.deadline());
+                // Drops a late answer to an earlier question, here and below. A line that floods has no end.
+                while self.wire.receive(&mut self.inbox, now).is_ok() && self.wire.now() < end {
+                    self.inbox.clear();
+                }
                 coding.append(unit, &mut request, copy);
             }
         }
         self.inbox.clear();
         self.wire.send(&request).map_err(Miss::End)?;
         let deadline = self.wire.deadline();
+        // What has come by the deadline is read behind it, too; a line that floods always has more.
+        let end = deadline + self.wire.patience();
         let mut is_echoed = false;
         loop {
+            if matches!(self.frame, Frame::Serial { .. }) && self.wire.now() > end {
+                return Err(Miss::Alien(std::mem::take(&mut self.inbox)));
+            }
             if let Frame::Serial { echoes, .. } = self.frame
                 && !is_echoed
                 && !self.inbox.is_empty()
@@ -305,4 +312,46 @@ pub(super) fn protocol(bytes: &[u8]) -> Option<&'static str> {
         [b'E', b'R', b'R', ..] | [b'A', b'C', b'K', ..] => "OPC UA",
         _ => return None,
     })
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use std::io::Write as _;
+    use std::sync::Arc;
+
+    use super::*;
+    use tickbus_base::os::{Parity, PseudoTerminal, SerialPort, SerialSettings};
+    use tickbus_base::time::{Clock, Monotonic};
+
+    const PATIENCE: Nanos = Nanos::from_millis(50);
+
+    const SETTINGS: SerialSettings = SerialSettings {
+        baud: 19200,
+        parity: Parity::Even,
+        two_stop_bits: false,
+        seven_bits: false,
+        rs485: false,
+    };
+
+    /// As a program that writes into its end without a pause.
+    #[test]
+    fn a_line_that_floods_has_an_end() {
+        for (coding, flood) in [(Coding::Rtu, &[0][..]), (Coding::Ascii, b":0103")] {
+            let (mut far, near) = PseudoTerminal::open().expect("a pseudo-terminal");
+            let flood = flood.repeat(4096);
+            std::thread::spawn(move || while far.write_all(&flood).is_ok() {});
+            let clock: Arc<dyn Clock> = Monotonic::shared();
+            let port = SerialPort::open(&near, SETTINGS).expect("a port");
+            let frame = Frame::Serial {
+                coding,
+                echoes: false,
+                apart: Nanos::ZERO,
+            };
+            let mut talk = Talk::new(Wire::serial(port, PATIENCE, &clock), frame);
+            let (ended, has_ended) = std::sync::mpsc::channel();
+            std::thread::spawn(move || ended.send(talk.identity(1)));
+            let answer = has_ended.recv_timeout(std::time::Duration::from_secs(20));
+            assert!(matches!(answer, Ok(Err(_))), "{coding:?}: {answer:?}");
+        }
+    }
 }

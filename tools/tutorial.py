@@ -39,6 +39,8 @@ FENCE = re.compile(r"^```(.*)$")
 COMMENT = re.compile(r"^<!-- needs: (.*) -->$")
 WILD = "…"
 INSIDE = "TICKBUS_TUTORIAL_INSIDE"
+NOT_AT_A_DESK = {"CI", "BUILD_NUMBER", "FORCE_COLOR", "PY_COLORS"}
+"""Variables by which programs print otherwise than at the reader's desk: pytest, for one, shortens no line on a CI server."""
 
 
 class Wrong(Exception):
@@ -263,7 +265,8 @@ def furnished(needs, environment, pythons):
 def follow(page, asked):
     """Follows one page, and prints its verdict; false if the page is wrong."""
     environment = {
-        **os.environ, "LC_ALL": "C.UTF-8", "PYTHONUNBUFFERED": "1", "PYTHONDONTWRITEBYTECODE": "1",
+        **{name: value for name, value in os.environ.items() if name not in NOT_AT_A_DESK},
+        "LC_ALL": "C.UTF-8", "COLUMNS": "80", "PYTHONUNBUFFERED": "1", "PYTHONDONTWRITEBYTECODE": "1",
         "TICKBUS_HOME": str(Path(__file__).resolve().parents[1]),
         "PATH": ":".join([*(str(folder.resolve()) for folder in asked.path), os.environ["PATH"]]),
     }

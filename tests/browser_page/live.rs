@@ -2,6 +2,7 @@
 
 mod large;
 mod past;
+mod touch;
 
 use std::fs;
 use std::io::{BufRead as _, BufReader};

@@ -37,6 +37,7 @@ pub(crate) const ASSETS: &[Asset] = &[
     script("/list.js", include_str!("list.js")),
     script("/line.js", include_str!("line.js")),
     script("/picture.js", include_str!("picture.js")),
+    script("/touch.js", include_str!("touch.js")),
     script("/bar.js", include_str!("bar.js")),
     script("/live.js", include_str!("live.js")),
 ];

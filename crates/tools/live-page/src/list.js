@@ -252,6 +252,18 @@ const list = (() => {
     redraw();
   }
 
+  /** Selects a signal and scrolls to it; false if it is not listed. Without `far` the page itself stays where it is. */
+  function find(signal, far = true) {
+    select(signal);
+    if (chosenRow < 0) return false;
+    if (far || frame.scrollHeight > frame.clientHeight + 1) {
+      // With its trend, if that is open.
+      if (signal.isOpen) scrollTo(chosenRow + 1);
+      scrollTo(chosenRow);
+    }
+    return true;
+  }
+
   /** Moves the choice by this many signals. */
   function move(by) {
     const step = Math.sign(by);
@@ -320,7 +332,7 @@ const list = (() => {
   });
 
   return {
-    choose, redraw, select, toggle, isMoving, drawn,
+    choose, redraw, select, find, toggle, isMoving, drawn,
     filter(text) {
       wanted = text.toLowerCase().split(/\s+/).filter(Boolean);
       choose();

@@ -50,15 +50,24 @@
     change("DELETE", pathOf(signal), undefined, `${signal.name} is released${bar.moment ? " now; the page shows the past" : ""}.`);
   }
 
+  /** True if a signal can be forced now; says why if not. */
+  function canForce(signal) {
+    if (!mayForce) {
+      say("Read-only: open the address that was printed, with its token, to force a signal.", true);
+    } else if (!signal.isWritable) {
+      const why = signal.driver.kind === "sync" ? "that would change the run" : "the program only observes this bus";
+      say(`${signal.name} cannot be forced: ${why}.`, true);
+    } else {
+      return !isPast();
+    }
+    return false;
+  }
+
   /** Opens the tools that force the chosen signal. */
   function edit(signal) {
     if (!signal) {
       say("Choose a signal first.", true);
-    } else if (!mayForce) {
-      say("Read-only: open the address that was printed, with its token, to force a signal.", true);
-    } else if (!signal.isWritable) {
-      say(`${signal.name} cannot be forced.`, true);
-    } else if (isPast()) {
+    } else if (!canForce(signal)) {
       // Nothing to type.
     } else if (signal.isBool) {
       get(plant.number(signal) > 0.5 ? "force-false" : "force-true").focus();
@@ -111,9 +120,21 @@
     },
   });
   list.begin({
-    chosen: showChosen,
+    chosen(signal) {
+      showChosen(signal);
+      touch.show();
+    },
     force: edit,
     release,
+  });
+  touch.begin({
+    say, canForce, change, pathOf, release,
+    force: edit,
+    listAll() {
+      get("filter").value = "";
+      list.filter("");
+      choose("all");
+    },
   });
 
   get("chosen").addEventListener("submit", (event) => {
@@ -237,6 +258,7 @@
       bar.redraw();
       if (list.chosen) showChosen(list.chosen);
       const moves = !isOld && pictures.move();
+      touch.show();
       // The bar counts on in the past.
       if (!isOld && (moves || list.isMoving() || bar.moment)) redraw();
     });
@@ -268,6 +290,7 @@
     },
     age(isNowOld, seconds) {
       isOld = isNowOld;
+      touch.link(isOld);
       document.body.classList.toggle("is-old", isOld);
       setLink();
       get("age").hidden = !isOld;

@@ -22,6 +22,7 @@ const pictures = (() => {
     all = loaded.filter(Boolean);
     box.replaceChildren(...all.map(({ element }) => element));
     for (const picture of all) prepare(picture);
+    touch.prepare(all);
     move();
   }
 
@@ -203,6 +204,9 @@ const pictures = (() => {
           break;
         case "text":
           say(mover, filled(binding.map && out !== undefined ? String(out) : "{}", binding.edges ? null : signal, value));
+          break;
+        case "press":
+        case "switch":
           break;
         case "spin":
           mover.spun = (mover.spun + (out ?? 0) * passed / 1000) % 360;

@@ -2,7 +2,7 @@
 //!
 //! A binding is `NAME`, or `NAME: MAP`. A map is a factor (`0.5`, `90 - 45`), or cases: `0..250 -> 0..-180, else -> 0`.
 //! To show or hide an element, cases have no arrow: `1, 3..5`. For a text, a map without an arrow is a pattern: `lift 1
-//! at {0} mm`.
+//! at {0} mm`. Parts to press have the value that they force while they are held: `Stop button: off`.
 
 mod map;
 
@@ -32,6 +32,10 @@ const ACTIONS: &[(&str, Kind)] = &[
     ("y", Kind::Number),
 ];
 
+/// What makes an element a control: a push-button, which is held, and a switch, which stays.
+const PRESS: &str = "press";
+const SWITCH: &str = "switch";
+
 /// The other attributes of a moving element.
 const PIVOT: &str = "pivot";
 const SMOOTH: &str = "smooth";
@@ -58,6 +62,7 @@ fn bind_all(element: &mut Element, names: &Names<'_>, notes: &mut Notes) {
         let read = match &*what {
             PIVOT => pivot(&text).map(|value| set(element, "data-tb-pivot", value)),
             SMOOTH => smooth(&text).map(|value| set(element, "data-tb-smooth", value)),
+            PRESS | SWITCH => control(&what, &text, names).map(|binding| bindings.push(binding)),
             _ => binding(&what, &text, names).map(|binding| bindings.push(binding)),
         };
         if let Err(mistake) = read {
@@ -109,6 +114,18 @@ impl Names<'_> {
         found
     }
 
+    /// Like [`split`](Self::split), with the mistake of an unknown name.
+    fn find<'t>(&self, text: &'t str) -> Result<(&'t str, bool, Option<&'t str>), String> {
+        self.split(text).ok_or_else(|| {
+            let name = text.split(':').next().unwrap_or_default().trim();
+            format!(
+                "there is no signal \"{}\"; {}",
+                short(name),
+                self.advice(name)
+            )
+        })
+    }
+
     /// The suggestion for an unknown name.
     fn advice(&self, name: &str) -> String {
         let all = self.signals.iter().copied().chain(OF_BUS.iter().copied());
@@ -122,7 +139,8 @@ impl Names<'_> {
 /// One binding, in the format for the page's script.
 fn binding(what: &str, text: &str, names: &Names<'_>) -> Result<Value, String> {
     let Some((_, kind)) = ACTIONS.iter().find(|(name, _)| *name == what) else {
-        let all = ACTIONS.iter().map(|(name, _)| *name).chain([PIVOT, SMOOTH]);
+        let others = [PIVOT, PRESS, SMOOTH, SWITCH];
+        let all = ACTIONS.iter().map(|(name, _)| *name).chain(others);
         return Err(match nearest(what, all.clone()) {
             Some(near) => format!("nothing can be done by this name; did you mean data-tb-{near}?"),
             None => format!(
@@ -131,16 +149,37 @@ fn binding(what: &str, text: &str, names: &Names<'_>) -> Result<Value, String> {
             ),
         });
     };
-    let Some((signal, edges, rest)) = names.split(text) else {
-        let name = text.split(':').next().unwrap_or_default().trim();
-        return Err(format!(
-            "there is no signal \"{}\"; {}",
-            short(name),
-            names.advice(name)
-        ));
-    };
+    let (signal, edges, rest) = names.find(text)?;
     let map = rest.map(|rest| map::read(rest, *kind)).transpose()?;
     Ok(json!({ "do": what, "signal": signal, "edges": edges, "map": map }))
+}
+
+/// A push-button or a switch: the signal, and for a push-button the value while it is pressed.
+fn control(what: &str, text: &str, names: &Names<'_>) -> Result<Value, String> {
+    let (signal, edges, rest) = names.find(text)?;
+    if edges || OF_BUS.contains(&signal) {
+        return Err(format!(
+            "\"{}\" is no signal that can be forced",
+            short(text.trim())
+        ));
+    }
+    let to = match (what, rest) {
+        (_, None) => 1.0,
+        (PRESS, Some("off" | "false")) => 0.0,
+        (PRESS, Some("on" | "true")) => 1.0,
+        (PRESS, Some(rest)) => number(rest).ok_or_else(|| {
+            format!(
+                "\"{}\" is no value; write what the signal is while the button is pressed: on, off or a number",
+                short(rest)
+            )
+        })?,
+        (_, Some(_)) => {
+            return Err(
+                "a switch has the name of its signal alone, which has to be a BOOL".to_owned(),
+            );
+        }
+    };
+    Ok(json!({ "do": what, "signal": signal, "edges": false, "map": null, "to": to }))
 }
 
 /// A point: two numbers, in the element's own units.

@@ -192,6 +192,34 @@ fn bindings_become_data() {
 }
 
 #[test]
+fn controls_have_a_signal_and_the_value_of_a_pressed_button() {
+    let picture = good(
+        "<g data-tb-press=\"Lamp\"/><g data-tb-press=\"Mode: auto: off\"/><g data-tb-press=\"LA1 position: 12.5\"/>\
+         <g data-tb-switch=\"Lamp\"/>\n<g data-tb-press=\"Lump\"/><g data-tb-press=\"Lamp.edges\"/><g data-tb-press=\"bus.age\"/>\
+         <g data-tb-press=\"Lamp: hard\"/><g data-tb-switch=\"Lamp: on\"/>",
+    );
+    for binding in [
+        "[{do:press,edges:false,map:null,signal:Lamp,to:1.0}]",
+        "[{do:press,edges:false,map:null,signal:Mode: auto,to:0.0}]",
+        "[{do:press,edges:false,map:null,signal:LA1 position,to:12.5}]",
+        "[{do:switch,edges:false,map:null,signal:Lamp,to:1.0}]",
+    ] {
+        let svg = picture.svg.replace("&quot;", "");
+        assert!(svg.contains(binding), "{binding} in {svg}");
+    }
+    assert_eq!(
+        picture.mistakes,
+        [
+            "line 3: data-tb-press: there is no signal \"Lump\"; did you mean \"Lamp\"?",
+            "line 3: data-tb-press: \"Lamp.edges\" is no signal that can be forced",
+            "line 3: data-tb-press: \"bus.age\" is no signal that can be forced",
+            "line 3: data-tb-press: \"hard\" is no value; write what the signal is while the button is pressed: on, off or a number",
+            "line 3: data-tb-switch: a switch has the name of its signal alone, which has to be a BOOL",
+        ]
+    );
+}
+
+#[test]
 fn a_misspelt_binding_is_told_with_what_is_nearest() {
     let picture = good(
         "<g data-tb-y=\"LA1 postion: 0..250 -> 0..-180\"/>\n<g data-tb-fil=\"Lamp\"/>\n<g data-tb-show=\"Something else\"/>\n\

@@ -1,0 +1,212 @@
+//! Touching the picture of the machine, by mouse, finger and keyboard.
+
+use std::path::PathBuf;
+
+use serde_json::json;
+
+use super::{Machine, TANK, open, row, wait_marked, wait_shown};
+use crate::webdriver::{Browser, shoot};
+use crate::{assert_quiet, wait_said};
+
+const ENTER: &str = "\u{e007}";
+const TAB: &str = "\u{e004}";
+
+const PICTURE: &str = r#"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 400 200">
+<g id="start" data-tb-press="Level low"><rect x="20" y="120" width="100" height="60" fill="gray" data-tb-fill="Level low: off -> gray, on -> lime"/><text x="40" y="155">Start</text></g>
+<g id="turn" data-tb-switch="Level low"><rect x="150" y="120" width="100" height="60"/></g>
+<rect id="level" x="20" y="20" width="100" height="80" fill="blue" data-tb-height="Level: 0..500"/>
+<text id="point" x="150" y="60" data-tb-text="Set point"/>
+</svg>"#;
+
+fn touched() -> (Machine, Browser) {
+    let machine = Machine::with(
+        "modbus-server",
+        "picture = \"tank.svg\"\n",
+        TANK,
+        &[("tank.svg", PICTURE)],
+    );
+    machine.write("4", "1", "13824");
+    let browser = open(&machine, 1280, 800);
+    browser.wait(&format!("{}?.getAttribute('aria-label')", part("start")));
+    wait_shown(&browser, "Level", "250.00mm");
+    (machine, browser)
+}
+
+fn part(id: &str) -> String {
+    format!(
+        "document.querySelector('.picture > div > div')?.shadowRoot?.getElementById({})",
+        json!(id)
+    )
+}
+
+/// The middle of a part, on the screen.
+fn place(browser: &Browser, id: &str) -> (i64, i64) {
+    let found = browser.run(&format!(
+        "const box = {}.getBoundingClientRect(); \
+         return [Math.round(box.left + box.width / 2), Math.round(box.top + box.height / 2)]",
+        part(id)
+    ));
+    let number = |at: usize| found[at].as_i64().expect("a place");
+    (number(0), number(1))
+}
+
+/// Moves a pointer to a part, and then does this.
+fn point(browser: &Browser, kind: &str, id: &str, then: &[&str]) {
+    let (x, y) = place(browser, id);
+    let mut actions = vec![json!({"type": "pointerMove", "x": x, "y": y, "duration": 0})];
+    actions.extend(
+        then.iter()
+            .map(|what| json!({"type": what, "button": 0, "duration": 0})),
+    );
+    browser.act(&json!([{"type": "pointer", "id": kind, "parameters": {"pointerType": kind}, "actions": actions}]));
+}
+
+fn key(browser: &Browser, what: &str, key: &str) {
+    browser.act(&json!([{"type": "key", "id": "keys", "actions": [{"type": what, "value": key}]}]));
+}
+
+const DOWN_UP: [&str; 2] = ["pointerDown", "pointerUp"];
+
+#[test]
+fn a_part_tells_its_signal_is_found_in_the_list_and_opens_its_trend() {
+    let folder = std::env::var_os("TICKBUS_SCREENSHOTS").map(PathBuf::from);
+    let (_machine, browser) = touched();
+    let tip = "document.querySelector('.picture .tip:not([hidden])')?.textContent";
+    point(&browser, "mouse", "level", &[]);
+    browser.wait(&format!("{tip} === 'Level: 250.00 mm'"));
+    // A filter that hides the signal goes.
+    browser.run("const it = document.getElementById('filter'); it.value = 'valve'; it.dispatchEvent(new Event('input'))");
+    browser.wait(&format!("!({})", row("Level")));
+    point(&browser, "mouse", "level", &DOWN_UP);
+    browser.wait("document.getElementById('chosen-name').textContent === 'Level'");
+    browser.wait(&format!(
+        "{}?.getAttribute('aria-selected') === 'true'",
+        row("Level")
+    ));
+    browser.wait("document.querySelectorAll('.picture .marks .chosen:not([hidden])').length === 1");
+    // The reverse: what is chosen in the list is marked in the picture.
+    super::choose(&browser, "Set point");
+    let marked = format!(
+        "(() => {{ const a = document.querySelector('.picture .marks .chosen:not([hidden])')?.getBoundingClientRect(); \
+         const b = {}.getBoundingClientRect(); \
+         return a && Math.abs(a.left + 3 - b.left) < 1 && Math.abs(a.width - 6 - b.width) < 1; }})()",
+        part("point")
+    );
+    browser.wait(&marked);
+    // By the keyboard: arrows go from part to part, the trend opens, and it is forced.
+    browser.run(&format!("{}.ownerSVGElement.focus()", part("level")));
+    key(&browser, "keyDown", "\u{e014}");
+    key(&browser, "keyUp", "\u{e014}");
+    let focused = |id: &str| {
+        browser.wait(&format!(
+            "document.querySelector('.picture > div > div').shadowRoot.activeElement === {}",
+            part(id)
+        ));
+    };
+    focused("start");
+    browser.keys(TAB);
+    focused("turn");
+    browser.keys("\u{e014}");
+    focused("level");
+    browser.wait(&format!(
+        "{}.getAttribute('aria-label') === 'Level: 250.00 mm'",
+        part("level")
+    ));
+    browser.keys(ENTER);
+    browser.wait("document.querySelector('.row.trend:not([hidden]) canvas')?.getAttribute('aria-label') === 'Trend of Level'");
+    shoot(&browser, folder.as_deref(), "live-touch.png", false);
+    browser.keys("f");
+    browser.wait("document.activeElement.id === 'force-value'");
+    browser.keys(&format!("100{ENTER}"));
+    wait_said(&browser, "Level is forced to 100 mm.");
+    browser.wait(&format!(
+        "{tip}?.startsWith('Level: 100.00 mm, forced') || document.activeElement.id === 'force-value'"
+    ));
+    assert_quiet(&browser);
+}
+
+#[test]
+fn a_push_button_is_held_as_long_as_pointer_or_key() {
+    let (machine, browser) = touched();
+    let is_on = |what: bool| {
+        wait_shown(&browser, "Level low", if what { "TRUE" } else { "FALSE" });
+        wait_marked(&browser, "Level low", if what { "forced" } else { "" });
+    };
+    for kind in ["mouse", "touch"] {
+        point(&browser, kind, "start", &["pointerDown"]);
+        is_on(true);
+        assert_eq!(machine.read("1", "0"), 1, "the PLC sees it, by {kind}");
+        browser.wait("document.querySelector('.picture .marks .pressed:not([hidden])')");
+        browser.act(&json!([{"type": "pointer", "id": kind, "parameters": {"pointerType": kind}, "actions": [{"type": "pointerUp", "button": 0}]}]));
+        is_on(false);
+        browser.wait("!document.querySelector('.picture .marks .pressed:not([hidden])')");
+    }
+    for name in [" ", ENTER] {
+        browser.run(&format!("{}.focus()", part("start")));
+        key(&browser, "keyDown", name);
+        is_on(true);
+        key(&browser, "keyUp", name);
+        is_on(false);
+    }
+    // Whatever ends the hold lets go.
+    for end in [
+        "document.querySelector('.picture > div > div').shadowRoot.activeElement.blur()",
+        "window.dispatchEvent(new Event('blur'))",
+        "window.dispatchEvent(new Event('pagehide'))",
+        "touch.link(true); touch.link(false)",
+        "document.getElementById('pause').click()",
+    ] {
+        browser.run(&format!("{}.focus()", part("start")));
+        key(&browser, "keyDown", " ");
+        browser.wait("plant.isForcedNow(plant.signals[1])");
+        browser.run(end);
+        browser.wait("!plant.isForcedNow(plant.signals[1])");
+        key(&browser, "keyUp", " ");
+    }
+    // In the past nothing is pressed.
+    browser.wait("bar.moment");
+    point(&browser, "mouse", "start", &DOWN_UP);
+    wait_said(
+        &browser,
+        "You look at the past, and a force acts on the present: press Live first.",
+    );
+    browser.run("document.getElementById('to-live').click()");
+    browser.wait("!bar.moment");
+    // A switch stays, until it is turned back.
+    point(&browser, "mouse", "turn", &DOWN_UP);
+    is_on(true);
+    browser.wait(&format!("{}.ariaChecked === 'true'", part("turn")));
+    point(&browser, "mouse", "turn", &DOWN_UP);
+    is_on(false);
+}
+
+#[test]
+fn a_button_is_let_go_when_its_page_is_left() {
+    let (machine, browser) = touched();
+    point(&browser, "mouse", "start", &["pointerDown"]);
+    wait_marked(&browser, "Level low", "forced");
+    browser.go("about:blank");
+    let begun = std::time::Instant::now();
+    while machine.read("1", "0") == 1 {
+        assert!(
+            begun.elapsed().as_secs() < 5,
+            "long before the grace time of ten seconds"
+        );
+    }
+}
+
+#[test]
+fn without_the_token_a_button_says_why_it_is_not_pressed() {
+    let (machine, _browser) = touched();
+    let browser = Browser::start(1280, 800);
+    browser.go(machine.url.split('#').next().expect("an address"));
+    browser.wait(&format!("{}?.getAttribute('aria-label')", part("start")));
+    browser.wait("document.getElementById('link').textContent === 'live'");
+    point(&browser, "touch", "start", &DOWN_UP);
+    wait_said(
+        &browser,
+        "Read-only: open the address that was printed, with its token, to force a signal.",
+    );
+    assert_eq!(machine.read("1", "0"), 0);
+    assert_quiet(&browser);
+}

@@ -210,3 +210,63 @@ fn without_the_token_a_button_says_why_it_is_not_pressed() {
     assert_eq!(machine.read("1", "0"), 0);
     assert_quiet(&browser);
 }
+
+#[test]
+fn the_buttons_in_the_drawing_of_a_training_machine_work() {
+    let folder = std::env::var_os("TICKBUS_SCREENSHOTS").map(PathBuf::from);
+    let temporary = tempfile::tempdir().expect("a folder");
+    let config = include_str!("../../../examples/machines/two-tanks/driver.cfg")
+        .replacen(
+            "\"modbus-server\"",
+            "\"modbus-server\"\naddress = \"127.0.0.1:0\"",
+            1,
+        )
+        .replacen("[page]", "[page]\nlisten = \"127.0.0.1:0\"", 1);
+    let picture = include_str!("../../../examples/machines/two-tanks/picture.svg");
+    std::fs::write(temporary.path().join("tank.cfg"), config)
+        .and_then(|()| std::fs::write(temporary.path().join("picture.svg"), picture))
+        .expect("there is room");
+    let machine = Machine::start(std::sync::Arc::new(temporary));
+    machine.write("4", "1", "640");
+    let browser = open(&machine, 1280, 800);
+    let root = "document.querySelector('.picture > div > div')?.shadowRoot";
+    for name in ["Start button", "Stop button"] {
+        let script = format!(
+            "{root}?.querySelector('[aria-label={}]')",
+            json!(format!("{name}, push-button"))
+        );
+        browser.wait(&script);
+        // On its caption, which belongs to it.
+        let found = browser.run(&format!(
+            "const box = {script}.querySelector('text').getBoundingClientRect(); \
+             return [Math.round(box.left + box.width / 2), Math.round(box.top + box.height / 2)]"
+        ));
+        let act = |actions: serde_json::Value| {
+            browser.act(&json!([{"type": "pointer", "id": "mouse", "actions": actions}]));
+        };
+        act(
+            json!([{"type": "pointerMove", "x": found[0], "y": found[1], "duration": 0}, {"type": "pointerDown", "button": 0}]),
+        );
+        wait_shown(&browser, name, "TRUE");
+        wait_marked(&browser, name, "forced");
+        browser.wait(
+            "document.querySelectorAll('.picture .marks .pressed:not([hidden])').length === 1",
+        );
+        if name == "Start button" {
+            shoot(&browser, folder.as_deref(), "live-page-touch.png", false);
+        }
+        act(json!([{"type": "pointerUp", "button": 0}]));
+        wait_marked(&browser, name, "");
+    }
+    for name in ["Control switch", "Batch switch"] {
+        let script = format!(
+            "{root}.querySelector('[role=switch][aria-label={}]')",
+            json!(format!("{name}, switch"))
+        );
+        browser.run(&format!("{script}.focus()"));
+        browser.keys(" ");
+        wait_marked(&browser, name, "forced");
+        browser.wait(&format!("{script}.ariaChecked === 'true'"));
+    }
+    assert_quiet(&browser);
+}

@@ -1,8 +1,12 @@
 //! Touching the picture of the machine, by mouse, finger and keyboard.
 
+use std::io::{Read as _, Write as _};
+use std::net::TcpStream;
 use std::path::PathBuf;
+use std::thread;
+use std::time::Duration;
 
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::{Machine, TANK, open, row, wait_marked, wait_shown};
 use crate::webdriver::{Browser, shoot};
@@ -132,14 +136,27 @@ fn a_push_button_is_held_as_long_as_pointer_or_key() {
         wait_shown(&browser, "Level low", if what { "TRUE" } else { "FALSE" });
         wait_marked(&browser, "Level low", if what { "forced" } else { "" });
     };
-    for kind in ["mouse", "touch"] {
-        point(&browser, kind, "start", &["pointerDown"]);
+    let is_held = "document.querySelector('.picture .marks .pressed:not([hidden])')";
+    point(&browser, "mouse", "start", &["pointerDown"]);
+    is_on(true);
+    assert_eq!(machine.read("1", "0"), 1, "the PLC sees it");
+    browser.wait(is_held);
+    browser.act(&json!([{"type": "pointer", "id": "mouse", "actions": [{"type": "pointerUp", "button": 0}]}]));
+    is_on(false);
+    browser.wait(&format!("!{is_held}"));
+    // By a finger, and by one that the browser takes away.
+    let (x, y) = place(&browser, "start");
+    for end in ["touchEnd", "touchCancel"] {
+        let finger = |kind: &str, points: Value| {
+            browser.devtools(
+                "Input.dispatchTouchEvent",
+                &json!({"type": kind, "touchPoints": points}),
+            );
+        };
+        finger("touchStart", json!([{"x": x, "y": y}]));
         is_on(true);
-        assert_eq!(machine.read("1", "0"), 1, "the PLC sees it, by {kind}");
-        browser.wait("document.querySelector('.picture .marks .pressed:not([hidden])')");
-        browser.act(&json!([{"type": "pointer", "id": kind, "parameters": {"pointerType": kind}, "actions": [{"type": "pointerUp", "button": 0}]}]));
+        finger(end, json!([]));
         is_on(false);
-        browser.wait("!document.querySelector('.picture .marks .pressed:not([hidden])')");
     }
     for name in [" ", ENTER] {
         browser.run(&format!("{}.focus()", part("start")));
@@ -152,7 +169,6 @@ fn a_push_button_is_held_as_long_as_pointer_or_key() {
     for end in [
         "document.querySelector('.picture > div > div').shadowRoot.activeElement.blur()",
         "window.dispatchEvent(new Event('blur'))",
-        "window.dispatchEvent(new Event('pagehide'))",
         "touch.link(true); touch.link(false)",
         "document.getElementById('pause').click()",
     ] {
@@ -227,7 +243,20 @@ fn the_buttons_in_the_drawing_of_a_training_machine_work() {
         .and_then(|()| std::fs::write(temporary.path().join("picture.svg"), picture))
         .expect("there is room");
     let machine = Machine::start(std::sync::Arc::new(temporary));
-    machine.write("4", "1", "640");
+    // A PLC that stays: it writes the level, again and again.
+    let mut plc = TcpStream::connect(&machine.bus).expect("it listens");
+    plc.set_read_timeout(Some(Duration::from_secs(5)))
+        .expect("a time-out");
+    thread::spawn(move || {
+        let mut answer = [0; 12];
+        while plc
+            .write_all(&[0, 1, 0, 0, 0, 6, 1, 6, 0, 1, 2, 128])
+            .and_then(|()| plc.read_exact(&mut answer))
+            .is_ok()
+        {
+            thread::sleep(Duration::from_millis(20));
+        }
+    });
     let browser = open(&machine, 1280, 800);
     let root = "document.querySelector('.picture > div > div')?.shadowRoot";
     for name in ["Start button", "Stop button"] {
@@ -241,7 +270,7 @@ fn the_buttons_in_the_drawing_of_a_training_machine_work() {
             "const box = {script}.querySelector('text').getBoundingClientRect(); \
              return [Math.round(box.left + box.width / 2), Math.round(box.top + box.height / 2)]"
         ));
-        let act = |actions: serde_json::Value| {
+        let act = |actions: Value| {
             browser.act(&json!([{"type": "pointer", "id": "mouse", "actions": actions}]));
         };
         act(

@@ -235,7 +235,8 @@ const touch = (() => {
       // The bar of time has the same arrows.
       event.stopPropagation();
     });
-    frame.classList.add("can-touch");
+    // The notice of stale data stands below the drawing, so that it hides no button.
+    frame.classList.toggle("has-controls", sheet.parts.some(({ control }) => control));
   }
 
   /** Uses a key; returns whether it did. */

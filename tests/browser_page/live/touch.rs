@@ -16,7 +16,7 @@ const ENTER: &str = "\u{e007}";
 const TAB: &str = "\u{e004}";
 
 const PICTURE: &str = r#"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 400 200">
-<g id="start" data-tb-press="Level low"><rect x="20" y="120" width="100" height="60" fill="gray" data-tb-fill="Level low: off -> gray, on -> lime"/><text x="40" y="155">Start</text></g>
+<g id="start" data-tb-press="Level low"><rect x="20" y="120" width="100" height="60" fill="gray" data-tb-fill="Level low: off -> gray, on -> lime" data-tb-stroke="Valve: off -> gray, on -> lime"/><text x="40" y="155">Start</text></g>
 <g id="turn" data-tb-switch="Level low"><rect x="150" y="120" width="100" height="60"/></g>
 <rect id="level" x="20" y="20" width="100" height="80" fill="blue" data-tb-height="Level: 0..500"/>
 <text id="point" x="150" y="60" data-tb-text="Set point"/>
@@ -78,6 +78,10 @@ fn a_part_tells_its_signal_is_found_in_the_list_and_opens_its_trend() {
     let tip = "document.querySelector('.picture .tip:not([hidden])')?.textContent";
     point(&browser, "mouse", "level", &[]);
     browser.wait(&format!("{tip} === 'Level: 250.00 mm'"));
+    point(&browser, "mouse", "start", &[]);
+    browser.wait(&format!(
+        "{tip}?.startsWith('Level low: FALSE · Valve: FALSE') && {tip}.endsWith('hold to press')"
+    ));
     // A filter that hides the signal goes.
     browser.run("const it = document.getElementById('filter'); it.value = 'valve'; it.dispatchEvent(new Event('input'))");
     browser.wait(&format!("!({})", row("Level")));

@@ -40,8 +40,13 @@ const touch = (() => {
     const sheet = { root, frame, marks, tip, parts: [], drawn: [] };
     for (const { element: drawn, bindings, signals } of movers) {
       const own = [...new Set(signals.filter(Boolean))];
+      if (!own.length || drawn.closest("defs, clipPath, mask, pattern, marker, symbol")) continue;
       // What is within a control belongs to it.
-      if (!own.length || drawn.closest("defs, clipPath, mask, pattern, marker, symbol") || drawn.parentNode.closest?.(".tb-control")) continue;
+      const outer = partOf.get(drawn.parentNode.closest?.(".tb-control"));
+      if (outer) {
+        outer.signals = [...new Set([...outer.signals, ...own])];
+        continue;
+      }
       const at = bindings.findIndex((binding, i) => KINDS[binding.do] && signals[i]);
       const control = at < 0 ? null : bindings[at];
       if (control) own.sort((a, b) => (b === signals[at]) - (a === signals[at]));

@@ -164,9 +164,8 @@ fn control(what: &str, text: &str, names: &Names<'_>) -> Result<Value, String> {
         ));
     }
     let to = match (what, rest) {
-        (_, None) => 1.0,
+        (_, None) | (PRESS, Some("on" | "true")) => 1.0,
         (PRESS, Some("off" | "false")) => 0.0,
-        (PRESS, Some("on" | "true")) => 1.0,
         (PRESS, Some(rest)) => number(rest).ok_or_else(|| {
             format!(
                 "\"{}\" is no value; write what the signal is while the button is pressed: on, off or a number",

@@ -1,6 +1,7 @@
 //! The live page: it shows a driver's signals, forces them, and reports when it cannot.
 
 mod large;
+mod outage;
 mod past;
 mod touch;
 

@@ -189,8 +189,8 @@ fn serve(
         attempt += 1;
         let now = clock.now();
         let reason = format!("{ended}; next attempt in {pause}");
-        status.enter(now, LinkState::Failed, (&ended).into(), &reason);
         let next = now + pause;
+        status.failed(now, (&ended).into(), &reason, next);
         while clock.now() < next && !stop.is_stopped() {
             // May return early because of a wake-up meant for the previous attempt.
             clock.wait_until(next, stop);

@@ -9,7 +9,7 @@ use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::faults::{
     Begin, Effect, Fault, FaultStatus, Lasts, Phase, Prepared, SignalEffect, Slots,
 };
-use tickbus_fieldbus::{Link, Role};
+use tickbus_fieldbus::{LineEvent, Link, Role};
 use tickbus_image::signal::{Area, Slot};
 use tickbus_record::{History, Recorder};
 
@@ -153,6 +153,21 @@ impl Watch {
     pub fn link(&self) -> Link {
         self.figures.status.observe_call(self.clock.now());
         self.figures.status.link()
+    }
+
+    /// Returns the last events of the line, the oldest first.
+    pub fn events(&self) -> Vec<LineEvent> {
+        self.figures.status.events()
+    }
+
+    /// Returns true if the line has ever come up.
+    pub fn has_run(&self) -> bool {
+        self.figures.status.runs() > 0
+    }
+
+    /// Returns when the bus is tried again after a failure; `None` if it does not wait for that.
+    pub fn next_attempt(&self) -> Option<Nanos> {
+        self.figures.status.next_attempt()
     }
 
     /// Returns the statistics: the line's at this moment, the tick's as of the last copy.

@@ -42,7 +42,7 @@ pub use dead_band::DeadBands;
 pub use error::BusError;
 pub use events::Events;
 pub use kind::{AnyOptions, BusKind, BusOptions, NamedFile, OpenError};
-pub use link::{Cause, Link, LinkState, LinkStatus};
+pub use link::{Cause, LineEvent, Link, LinkState, LinkStatus};
 pub use max_age::MaxAge;
 pub use port::{CallWatch, Farewell, Frames, Outputs, Port, Receipt};
 pub use rarely::{Rarely, Times, Topic};

@@ -1,5 +1,7 @@
 //! The state of a line, its cause, and the reason in words.
 
+mod journal;
+
 use std::collections::BTreeMap;
 use std::fmt::{Arguments, Write as _};
 use std::sync::atomic::{AtomicU8, AtomicUsize, Ordering};
@@ -13,6 +15,8 @@ use super::BusError;
 use super::max_age::MaxAge;
 use super::rarely::Rarely;
 use super::traffic::{Rates, Traffic};
+use journal::Journal;
+pub use journal::LineEvent;
 use tickbus_image::is_stale;
 
 /// The state of a line.
@@ -174,6 +178,7 @@ struct Shared {
 #[derive(Debug)]
 struct Record {
     link: Link,
+    journal: Journal,
     /// The reason of the last running state, to be restored when the line runs again.
     running: String,
     call: Option<Call>,
@@ -237,6 +242,7 @@ impl LinkStatus {
             sent_age: SharedHistogram::new(),
             record: Mutex::new(Record {
                 link,
+                journal: Journal::default(),
                 running: String::new(),
                 call: None,
                 injected: String::new(),
@@ -623,6 +629,7 @@ impl Shared {
             record.link.reason = reason;
             return None;
         }
+        record.journal.note(now, Some((state, cause)), &reason);
         record.entered[state as usize] += 1;
         record.caused[cause as usize] += 1;
         if state == LinkState::Running {

@@ -15,6 +15,7 @@ use crate::codec::Codec;
 use crate::sheet::{ChangeJson, FAIL_SAFE, FORCED, Row, STALE};
 
 mod forces;
+mod moments;
 
 /// The most faults and states of the line that are remembered.
 const MOST: usize = 10_000;
@@ -283,10 +284,19 @@ impl Archive {
 
     /// All marks, with their times as far as the history has them.
     fn timed_marks(&self) -> Vec<Mark> {
+        self.last_marks(usize::MAX)
+    }
+
+    /// The last `most` marks, with their times as far as the history has them.
+    fn last_marks(&self, most: usize) -> Vec<Mark> {
         let Some(Span { last, .. }) = self.history.span() else {
             return Vec::new();
         };
-        let mut marks: Vec<Mark> = self.notes().marks.iter().cloned().collect();
+        let mut marks: Vec<Mark> = {
+            let notes = self.notes();
+            let skipped = notes.marks.len().saturating_sub(most);
+            notes.marks.iter().skip(skipped).cloned().collect()
+        };
         // Each time is looked for once, without the lock, since that decodes a part of the history.
         let mut found = BTreeMap::new();
         for mark in marks
@@ -403,17 +413,7 @@ impl Archive {
                 change
             })
             .collect();
-        let line = {
-            let notes = self.notes();
-            let at = notes.lines.partition_point(|line| line.at <= tick.time);
-            at.checked_sub(1).map(|at| notes.lines[at].clone())
-        };
-        let line = line.map(|line| {
-            json!({
-                "state": line.state.name(), "cause": line.cause, "reason": line.reason,
-                "since_ms": millis(tick.time - line.at),
-            })
-        });
+        let line = self.line_at(tick.time);
         let texts: Vec<_> = faults.iter().map(|mark| &mark.text).collect();
         let head = json!({
             "tick": tick.number, "ms": millis(tick.time), "status": tick.status, "stations": tick.stations,

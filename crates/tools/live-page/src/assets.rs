@@ -35,6 +35,7 @@ pub(crate) const ASSETS: &[Asset] = &[
     script("/signals.js", include_str!("signals.js")),
     script("/trend.js", include_str!("trend.js")),
     script("/list.js", include_str!("list.js")),
+    script("/outage.js", include_str!("outage.js")),
     script("/line.js", include_str!("line.js")),
     script("/picture.js", include_str!("picture.js")),
     script("/touch.js", include_str!("touch.js")),

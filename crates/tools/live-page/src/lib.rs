@@ -10,6 +10,7 @@
 mod archive;
 mod assets;
 mod codec;
+mod events;
 mod exhibit;
 mod keeper;
 mod line;

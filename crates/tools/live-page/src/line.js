@@ -30,8 +30,10 @@ const line = (() => {
     const name = make("h3", "", head, driver.name);
     make("span", "note", head, `${driver.kind}, ${driver.role}`);
     const reason = make("p", "reason", it);
-    reason.setAttribute("role", "status");
+    // Beside the picture, which says it without chatter, only a run's reason is read aloud.
+    if (driver.kind === "sync") reason.setAttribute("role", "status");
     const since = make("p", "note since", it);
+    const way = outage.card(driver, it);
     const faults = make("ul", "faults", it);
     const model = modelFaults(driver, it);
     const facts = make("dl", "facts", it);
@@ -41,7 +43,7 @@ const line = (() => {
     const times = make("table", "times", make("div", "wide", more));
     const texts = make("table", "texts", make("div", "wide", more));
     const counters = make("table", "counters", make("div", "wide", more));
-    return { it, state, name, reason, since, faults, model, facts, stations, more, times, texts, counters };
+    return { it, state, name, reason, since, way, faults, model, facts, stations, more, times, texts, counters };
   }
 
   /** The tools that give the simulation's model one of its faults. */
@@ -163,6 +165,7 @@ const line = (() => {
       own.it.classList.toggle("trouble", state !== "running");
       say(own.reason, line.reason || "no reason known");
       say(own.since, `${line.since_ms === undefined ? "" : `for ${words.span(since(line))}, `}cause ${line.cause}, data ${line.status}${isSilent(line) ? `; the simulation has not ticked for ${words.span(line.silence_ms)}` : ""}`);
+      outage.show(own.way, line);
       // A forced value that was released is no longer worth a row.
       faults(own, (line.faults ?? []).filter(({ name, phase }) => phase !== "over" || !name.startsWith("forced: ")));
       showModelFaults(own, line.model_faults ?? []);

@@ -8,6 +8,7 @@ use tickbus_base::time::Nanos;
 use tickbus_driver::{StationView, Watch};
 use tickbus_fieldbus::{Cause, Link, LinkState, is_stale};
 
+use crate::events::{self, Event, whole_millis};
 use crate::value::Number;
 
 /// The suffixes of a distribution's keys.
@@ -50,6 +51,17 @@ pub(crate) struct Line<'a> {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(crate) facts: Vec<(&'static str, String)>,
     pub(crate) stations: Vec<Station<'a>>,
+    /// `server` if the peer connects to this end, `client` if this end connects; `None` if that is not known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) end: Option<&'static str>,
+    /// True if the line has ever come up.
+    pub(crate) has_run: bool,
+    /// The time until the bus is tried again after a failure.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) next_ms: Option<i64>,
+    /// The last events, the oldest first.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(crate) events: Vec<Event>,
     pub(crate) faults: Vec<Fault<'a>>,
     /// The faults that the simulation's model has declared.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -80,6 +92,10 @@ impl<'a> Line<'a> {
             silence_ms: None,
             facts: Vec::new(),
             stations: Vec::new(),
+            end: None,
+            has_run: state == LinkState::Running,
+            next_ms: None,
+            events: Vec::new(),
             faults: Vec::new(),
             model_faults: Vec::new(),
             counters: BTreeMap::new(),
@@ -150,7 +166,14 @@ pub(crate) fn millis(span: Nanos) -> Option<f64> {
     (span != Nanos::MAX).then(|| span.as_micros().round() / 1e3)
 }
 
-pub(crate) fn json(id: i32, watch: &Watch, link: &Link, statistics: &Statistics) -> String {
+/// The line of a driver as JSON; with these events of faults beside its own.
+pub(crate) fn json(
+    id: i32,
+    watch: &Watch,
+    link: &Link,
+    statistics: &Statistics,
+    fault_events: Vec<Event>,
+) -> String {
     let config = watch.config();
     let (now, silence) = (watch.clock().now(), watch.silence());
     let (faults, model_faults) = (watch.faults(), watch.model_faults());
@@ -182,10 +205,14 @@ pub(crate) fn json(id: i32, watch: &Watch, link: &Link, statistics: &Statistics)
     });
     let mut line = Line {
         reason: &link.reason,
-        since_ms: (now - link.since).0.max(0) / 1_000_000,
+        since_ms: whole_millis(now - link.since),
         tick,
         silence_ms: (silence != Nanos::MAX).then_some(silence.0 / 1_000_000),
         stations,
+        end: end_of(watch),
+        has_run: watch.has_run(),
+        next_ms: watch.next_attempt().map(|next| whole_millis(next - now)),
+        events: events::last([events::of_line(watch, now), fault_events].concat()),
         faults: faults
             .iter()
             .map(|fault| Fault {
@@ -202,6 +229,18 @@ pub(crate) fn json(id: i32, watch: &Watch, link: &Link, statistics: &Statistics)
     };
     sort(statistics, &mut line);
     line.text()
+}
+
+/// Which end of its connection the line is. After a change of the kind of bus that is not known.
+fn end_of(watch: &Watch) -> Option<&'static str> {
+    let bus = &watch.config().bus;
+    if bus.kind() != watch.bus_kind() {
+        return None;
+    }
+    if bus.complaints().is_some() {
+        return Some("server");
+    }
+    bus.kind().ends_with("-client").then_some("client")
 }
 
 /// Sorts statistics into counters, distributions and texts.

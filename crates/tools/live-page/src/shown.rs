@@ -166,7 +166,9 @@ impl Shown {
         }
         self.statistics = self.watch.statistics();
         self.link = link;
-        let line = line::json(self.id, &self.watch, &self.link, &self.statistics);
+        let archive = self.archive.as_ref();
+        let events = archive.map_or_else(Vec::new, |archive| archive.fault_events());
+        let line = line::json(self.id, &self.watch, &self.link, &self.statistics, events);
         self.sheet.set_line(now, number, line);
         true
     }

@@ -171,9 +171,9 @@ const plant = (() => {
     if (!line || !moment) return line;
     const isStale = (status) => status < 0 || status > 1;
     const statuses = moment.stations.length ? moment.stations : [moment.status];
-    const known = moment.line ?? { state: isStale(moment.status) ? "stale" : "running", cause: "unknown", reason: "" };
+    const known = moment.line ?? { state: isStale(moment.status) ? "stale" : "running", cause: "unknown", reason: "", events: [] };
     return {
-      ...line, ...known,
+      ...line, ...known, next_ms: undefined,
       isPast: true,
       status: ["fresh", "unchanged"][moment.status] ?? "stale",
       stations: line.stations.map((station, i) => {

@@ -1,0 +1,52 @@
+//! The line at a moment of the past, with its events before that.
+
+use serde_json::{Value, json};
+use tickbus_base::time::Nanos;
+use tickbus_fieldbus::LinkState;
+
+use super::{Archive, Mark, millis};
+use crate::events::{self, Event};
+
+impl Archive {
+    /// The state of the line at a time, and its last events; `None` if it is not known.
+    pub(super) fn line_at(&self, time: Nanos) -> Option<Value> {
+        let faults = events_of(&self.timed_marks(), time);
+        let notes = self.notes();
+        let known = notes.lines.partition_point(|line| line.at <= time);
+        let line = notes.lines.get(known.checked_sub(1)?)?;
+        let before = notes.lines.iter().take(known);
+        let has_run = before
+            .clone()
+            .any(|line| matches!(line.state, LinkState::Running | LinkState::Stale));
+        let mut events = faults;
+        let mut last = None;
+        for line in before {
+            // A reason in other words is no event.
+            if last.replace((line.state, line.cause)) != Some((line.state, line.cause)) {
+                let ago = time - line.at;
+                events.push(Event::entered(line.state, line.cause, &line.reason, ago));
+            }
+        }
+        Some(json!({
+            "state": line.state.name(), "cause": line.cause, "reason": line.reason,
+            "since_ms": millis(time - line.at), "has_run": has_run, "events": events::last(events),
+        }))
+    }
+
+    /// The faults that have begun and ended lately.
+    pub(crate) fn fault_events(&self) -> Vec<Event> {
+        let span = self.history.span();
+        span.map_or_else(Vec::new, |span| {
+            events_of(&self.last_marks(events::MOST), span.last.1)
+        })
+    }
+}
+
+/// The marks up to a time as events.
+fn events_of(marks: &[Mark], time: Nanos) -> Vec<Event> {
+    let timed = marks.iter().filter_map(|mark| {
+        let at = mark.at.filter(|at| *at <= time)?;
+        Some(Event::fault(mark.begins, &mark.text, time - at))
+    });
+    events::last(timed.collect())
+}

@@ -59,11 +59,11 @@ fn a_plc_that_dies_and_comes_back_is_marked_told_once_and_listed() {
             .expect("a truth")
     );
     assert_eq!(looks(&browser), "bad unknown good good");
-    shoot(&browser, shots().as_deref(), "outage-never", false);
+    shoot(&browser, shots().as_deref(), "outage-never.png", false);
     let mut plc = machine.plc();
     browser.wait("document.querySelector('.told').hidden");
     browser.wait("document.querySelectorAll('.way .good').length === 4");
-    shoot(&browser, shots().as_deref(), "outage-healthy", false);
+    shoot(&browser, shots().as_deref(), "outage-healthy.png", false);
     // What is read aloud changes once.
     browser.run(
         "window.told = []; new MutationObserver(() => window.told.push(document.querySelector('.told').textContent)) \
@@ -76,7 +76,7 @@ fn a_plc_that_dies_and_comes_back_is_marked_told_once_and_listed() {
     browser.run("await new Promise((go) => setTimeout(go, 2500))");
     let told = browser.run("return window.told.length");
     assert!(told.as_u64().is_some_and(|told| told <= 3), "{told}");
-    shoot(&browser, shots().as_deref(), "outage-broken", false);
+    shoot(&browser, shots().as_deref(), "outage-broken.png", false);
     let _plc = machine.plc();
     browser.wait("document.querySelectorAll('.way .good').length === 4");
     let names = events(&browser);
@@ -123,13 +123,13 @@ fn a_plc_that_does_not_answer_is_tried_again_with_a_countdown() {
     let browser = open(&machine, 390, 800);
     let nothing = json!(format!("Nothing answers at {bus}, since "));
     browser.wait(&format!("{TOLD}.startsWith({nothing})"));
-    assert_eq!(looks(&browser), "unknown bad good good");
+    assert_eq!(looks(&browser), "bad unknown good good");
     // It counts down, and the attempts that failed are one event.
     let next = "document.querySelector('.next')";
     browser.wait(&format!("/^Next try in 2 s$/.test({next}.textContent)"));
     browser.wait(&format!("/^Next try in 1 s$/.test({next}.textContent)"));
     browser.wait("[...document.querySelectorAll('.events strong')].some((it) => /^\\d tries failed$/.test(it.textContent))");
     assert_fits(&browser);
-    shoot(&browser, shots().as_deref(), "outage-phone", false);
+    shoot(&browser, shots().as_deref(), "outage-phone.png", false);
     assert_quiet(&browser);
 }

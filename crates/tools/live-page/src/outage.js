@@ -48,14 +48,22 @@ const outage = (() => {
 
   const isSilent = (line) => line.silence_ms > 1000;
 
+  /** The line as it failed, while another attempt is under way: the picture does not change with each attempt. */
+  function beneath(line) {
+    const before = line.events.filter(({ kind }) => !kind.startsWith("fault")).at(-2);
+    const isRetry = line.state === "opening" && line.cause === "waiting" && before?.kind === "failed";
+    return isRetry ? { ...line, state: "failed", cause: before.cause, reason: before.text } : line;
+  }
+
   /** Which box is broken, what is said there, what has happened and what to do. */
   function diagnose(driver, line) {
     const [peer, , , own] = names(driver);
     const the = peer === "PLC" ? "The PLC" : "The machine";
+    const them = `the ${peer === "PLC" ? "PLC" : "machine"}`;
     const address = line.texts.address ?? "";
     const port = /:(\d+)\b/.exec(address || line.reason)?.[1];
     const check = line.end === "client"
-      ? `Start ${the.toLowerCase().replace("plc", "PLC")}, or look with “tickbus doctor”.`
+      ? `Start ${them}, or look with “tickbus doctor”.`
       : `Look at cable, switch and ${peer}; “tickbus doctor” looks at each step.`;
     if (isSilent(line)) return { at: 3, word: "does not tick", what: `The ${own === "Machine" ? "simulation" : "program"} does not tick`, act: "Look at the program: it waits, hangs or has ended.", isOwn: true };
     if (line.state === "running" && line.status !== "stale") return null;
@@ -63,7 +71,7 @@ const outage = (() => {
       case "injected": return { at: 1, word: "fault injected", what: "An injected fault holds the line down", act: "End the fault, or wait until it is over." };
       case "defect": case "hung": return { at: 2, word: line.cause, what: "The driver is stuck", act: "Close the driver and open it again; the reason is above." };
       case "closed": case "not-opened": return { at: 2, word: "closed", what: "The driver is not open", act: "Start the simulation." };
-      case "stopped": return { at: 0, word: "in STOP", what: `${the} does not run its program`, act: `Switch ${the.toLowerCase().replace("plc", "PLC")} to RUN.` };
+      case "stopped": return { at: 0, word: "in STOP", what: `${the} does not run its program`, act: `Switch ${them} to RUN.` };
       case "frozen": return { at: 0, word: "frozen", what: `${the} sends the same values again and again`, act: "Look whether its program runs, and sets its life sign." };
       case "left": return { at: 0, word: "has left", isApart: true, what: `${the} has closed the connection`, act: line.end === "client" ? check : "Nothing to do here if it restarts; it may connect again at any time." };
       case "refused": return { at: 0, word: "refuses", what: `${the} refuses what the driver asks for`, act: "Compare its settings with driver.cfg; “tickbus doctor” names the difference." };
@@ -71,7 +79,7 @@ const outage = (() => {
     }
     if (line.end === "server" && line.state === "failed") return { at: 2, word: "cannot listen", what: "The driver cannot listen", act: "Correct the address in driver.cfg, or end the program that has the port." };
     if (line.state === "opening" && line.end === "server") {
-      if (line.has_run) return { at: 0, word: "not here", isApart: true, what: line.cause === "waiting" ? `${the} has not come back yet` : `The connection with ${the.toLowerCase().replace("plc", "PLC")} broke`, act: `Look at cable and ${peer}; it may connect again at any time.` };
+      if (line.has_run) return { at: 0, word: "not here", isApart: true, what: line.cause === "waiting" ? `${the} has not come back yet` : `The connection with ${them} broke`, act: `Look at cable and ${peer}; it may connect again at any time.` };
       const where = port ? ` to port ${port}` : "";
       const isNear = /^(127\.|localhost|\[::1\])/.test(address);
       const host = /^(0\.0\.0\.0|\[::\])/.test(address) || !address ? "the address of this computer" : address.replace(/:\d+$/, "");
@@ -79,11 +87,11 @@ const outage = (() => {
       const near = isNear ? " Only programs on this computer reach this address: for a PLC on the network write 0.0.0.0 into driver.cfg." : "";
       return { at: 0, word: "has not come yet", isApart: true, what: `No ${peer === "PLC" ? "PLC" : "machine"} has connected${where} yet`, act: peer === "PLC" ? enter + near : "Start it." };
     }
-    if (line.end === "client" && !line.has_run) {
-      const at = /\S*[\d\w\]]:\d+/.exec(line.reason)?.[0] ?? address;
-      return { at: 1, word: "no answer", what: `Nothing answers${at ? ` at ${at}` : ""}`, act: check };
+    if (line.end === "client" && line.cause === "link") {
+      const at = /\S*[\w\]]:\d+/.exec(line.reason)?.[0] ?? address;
+      return { at: 0, word: "no answer", isApart: true, what: `Nothing answers${at ? ` at ${at}` : ""}`, act: check };
     }
-    if (line.cause === "silent" || line.status === "stale" && line.state === "running") return { at: 1, word: "silent", what: `Nothing comes from ${the.toLowerCase().replace("plc", "PLC")} any more`, act: check };
+    if (line.cause === "silent" || line.status === "stale" && line.state === "running") return { at: 1, word: "silent", what: `Nothing comes from ${them} any more`, act: check };
     if (line.state === "opening") return { at: 1, word: "not up yet", what: "The line is not up yet", act: check };
     return { at: 1, word: "broken", what: "The line is broken", act: check };
   }
@@ -146,7 +154,7 @@ const outage = (() => {
     if (line.heard !== own.line?.heard) own.heard = Date.now();
     own.line = { ...line, events: line.events ?? [], texts: line.texts ?? {} };
     line = own.line;
-    const wrong = diagnose(own.driver, line);
+    const wrong = diagnose(own.driver, beneath(line));
     own.boxes.forEach(({ it, mark, text }, i) => {
       // Of what lies behind the break nothing is known, nor of the cable to a PLC that is not there.
       const isKnown = !wrong || i > wrong.at && !(wrong.isApart && i === 1) || wrong.isOwn;

@@ -79,7 +79,7 @@ const outage = (() => {
     }
     if (line.end === "server" && line.state === "failed") return { at: 2, word: "cannot listen", what: "The driver cannot listen", act: "Correct the address in driver.cfg, or end the program that has the port." };
     if (line.state === "opening" && line.end === "server") {
-      if (line.has_run) return { at: 0, word: "not here", isApart: true, what: line.cause === "waiting" ? `${the} has not come back yet` : `The connection with ${them} broke`, act: `Look at cable and ${peer}; it may connect again at any time.` };
+      if (line.has_run) return { at: 0, word: "not here", isApart: true, what: line.cause === "waiting" ? `${the} has not come back yet` : `The connection with ${them} broke`, act: `Look at cable and ${peer}; ${them} may connect again at any time.` };
       const where = port ? ` to port ${port}` : "";
       const isNear = /^(127\.|localhost|\[::1\])/.test(address);
       const host = /^(0\.0\.0\.0|\[::\])/.test(address) || !address ? "the address of this computer" : address.replace(/:\d+$/, "");

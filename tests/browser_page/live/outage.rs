@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use serde_json::json;
 
-use super::{Machine, TANK, open};
+use super::{Machine, TANK, force, open};
 use crate::webdriver::{Browser, shoot};
 use crate::{assert_fits, assert_quiet, find};
 
@@ -77,12 +77,21 @@ fn a_plc_that_dies_and_comes_back_is_marked_told_once_and_listed() {
     let told = browser.run("return window.told.length");
     assert!(told.as_u64().is_some_and(|told| told <= 3), "{told}");
     shoot(&browser, shots().as_deref(), "outage-broken.png", false);
+    let dark = json!({"features": [{"name": "prefers-color-scheme", "value": "dark"}]});
+    browser.devtools("Emulation.setEmulatedMedia", &dark);
+    browser.run("document.querySelector('.told').scrollIntoView({ behavior: 'instant' })");
+    shoot(&browser, shots().as_deref(), "outage-dark.png", false);
     let _plc = machine.plc();
     browser.wait("document.querySelectorAll('.way .good').length === 4");
     let names = events(&browser);
     assert_eq!(names[0], "connected", "{names:?}");
     assert!(names[1..].contains(&"connected".to_owned()), "{names:?}");
     assert!(names.len() <= 10);
+    // Faults are among the events.
+    force(&browser, "Start button", "TRUE");
+    browser.wait("document.querySelector('.events strong').textContent === 'fault injected'");
+    browser.run("document.getElementById('release-all').click()");
+    browser.wait("document.querySelector('.events strong').textContent === 'fault over'");
     // The bar of time shows the outage as it was.
     browser.run("await bar.jump(false)");
     browser.wait("bar.moment && document.querySelector('.way .bad')");

@@ -50,3 +50,15 @@ const fn script(path: &'static str, text: &'static str) -> Asset {
         text,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_page_is_at_most_250_kilobytes() {
+        let sizes = ASSETS.iter().map(|asset| asset.text.len());
+        let size: usize = sizes.sum();
+        assert!(size <= 250_000, "{size} bytes");
+    }
+}

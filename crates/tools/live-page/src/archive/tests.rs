@@ -4,6 +4,7 @@ use tickbus_image::signal::{DataType, Signal};
 use tickbus_record::{Column, Columns, ValueKind};
 
 use super::*;
+use tickbus_fieldbus::Cause;
 
 /// An archive of twenty ticks, one each millisecond, with one signal.
 fn archive() -> Archive {
@@ -162,4 +163,43 @@ fn a_forced_value_takes_the_place_of_the_one_that_the_simulation_wrote() {
         state["values"][0][1].as_f64()
     };
     assert_eq!([2, 3, 8, 12].map(value), [0.0, 5.0, 6.0, 0.0].map(Some));
+}
+
+#[test]
+fn a_moment_has_the_line_and_the_events_before_it() {
+    let archive = archive();
+    let link = |state, cause, reason: &str, since| Link {
+        state,
+        cause,
+        reason: reason.to_owned(),
+        since: Nanos::from_millis(since),
+    };
+    let now = Nanos::from_millis(20);
+    archive.note_line(
+        &link(LinkState::Opening, Cause::Waiting, "listening", 5),
+        now,
+    );
+    archive.note_line(&link(LinkState::Running, Cause::Running, "here", 10), now);
+    archive.note_line(&link(LinkState::Failed, Cause::Link, "broken", 15), now);
+    archive.note_line(
+        &link(LinkState::Failed, Cause::Link, "still broken", 15),
+        now,
+    );
+    archive.note_faults(&[forced(1, Phase::Active, 12, 12)], 0);
+    let kinds = |millis| {
+        let line = archive.line_at(Nanos::from_millis(millis))?;
+        let events = line["events"].as_array()?.iter();
+        let kinds: Vec<_> = events.filter_map(|it| it["kind"].as_str()).collect();
+        let kinds = kinds.join(" ");
+        Some((kinds, line["has_run"] == true, line["since_ms"].as_f64()?))
+    };
+    assert_eq!(kinds(4), None);
+    assert_eq!(kinds(9), Some(("opening".to_owned(), false, 4.0)));
+    assert_eq!(
+        kinds(13),
+        Some(("opening running fault".to_owned(), true, 3.0))
+    );
+    let all = "opening running fault failed";
+    assert_eq!(kinds(20), Some((all.to_owned(), true, 5.0)));
+    assert_eq!(archive.fault_events()[0].ago_ms, 8);
 }

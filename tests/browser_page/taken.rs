@@ -122,5 +122,6 @@ fn the_address_of_a_plc_is_changed_on_the_page_of_a_running_machine() {
     wait_speed(&browser, "22");
     click(&browser, "#tabs a:first-child");
     browser.wait("document.querySelector('#list') !== null && plant.drivers.length === 1");
+    browser.wait("[...document.querySelectorAll('.events strong')].some((it) => it.textContent === 'changed settings')");
     assert_quiet(&browser);
 }

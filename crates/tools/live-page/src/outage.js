@@ -89,7 +89,7 @@ const outage = (() => {
     }
     if (line.end === "client" && line.cause === "link") {
       const at = /\S*[\w\]]:\d+/.exec(line.reason)?.[0] ?? address;
-      return { at: 0, word: "no answer", isApart: true, what: `Nothing answers${at ? ` at ${at}` : ""}`, act: check };
+      return { at: 0, word: "no reply", isApart: true, what: `Nothing answers${at ? ` at ${at}` : ""}`, act: check };
     }
     if (line.cause === "silent" || line.status === "stale" && line.state === "running") return { at: 1, word: "silent", what: `Nothing comes from ${them} any more`, act: check };
     if (line.state === "opening") return { at: 1, word: "not up yet", what: "The line is not up yet", act: check };

@@ -1,5 +1,6 @@
 //! The live page: it shows a driver's signals, forces them, and reports when it cannot.
 
+mod analyser;
 mod large;
 mod outage;
 mod past;

@@ -22,6 +22,11 @@ pub(crate) const ASSETS: &[Asset] = &[
         kind: STYLE,
         text: include_str!("page.css"),
     },
+    Asset {
+        path: "/analyser.css",
+        kind: STYLE,
+        text: include_str!("analyser.css"),
+    },
     script("/stream.js", tickbus_web::STREAM),
     script("/client.js", tickbus_web::CLIENT),
     script("/tabs.js", tickbus_web::TABS),
@@ -40,6 +45,8 @@ pub(crate) const ASSETS: &[Asset] = &[
     script("/picture.js", include_str!("picture.js")),
     script("/touch.js", include_str!("touch.js")),
     script("/bar.js", include_str!("bar.js")),
+    script("/trigger.js", include_str!("trigger.js")),
+    script("/analyser.js", include_str!("analyser.js")),
     script("/live.js", include_str!("live.js")),
 ];
 

@@ -54,7 +54,7 @@ const bar = (() => {
     if (!moment) {
       offsets = new Map(plant.drivers.filter(({ past }) => past).map((driver) => [driver.id, driver.past.last - lead.past.last]));
     }
-    while (wanted) {
+    while (wanted && !wanted.isLive) {
       const { place, isStep, own } = wanted;
       wanted = null;
       const begun = performance.now();
@@ -260,5 +260,9 @@ const bar = (() => {
     /** Sets what the page does: `say(text, isBad)`, `shown()`, `chosen()`. */
     begin(actions) { act = actions; },
     get moment() { return moment; },
+    /** The driver whose time the bar shows. */
+    get lead() { return lead; },
+    /** How much later a driver's time is than the lead's, in milliseconds. */
+    offset: (driver) => (driver === lead || !driver.past ? 0 : moment ? offsets.get(driver.id) ?? 0 : driver.past.last - lead.past.last),
   };
 })();

@@ -148,6 +148,7 @@ const list = (() => {
     signal() {
       const element = document.createElement("div");
       element.className = "row signal";
+      element.draggable = true;
       element.id = `row${ids++}`;
       element.setAttribute("role", "row");
       element.dataset.kind = "signal";
@@ -298,6 +299,7 @@ const list = (() => {
     Enter: () => { if (chosen) toggle(chosen); },
     " ": () => { if (chosen) toggle(chosen); },
     f: () => act.force(chosen),
+    a: () => act.analyse(chosen),
     Delete: () => act.release(chosen),
     Backspace: () => act.release(chosen),
     Escape: () => select(null),
@@ -341,7 +343,7 @@ const list = (() => {
       kind = which;
       choose();
     },
-    /** Sets the listeners: `chosen(signal)`, `force(signal)`, `release(signal)`. */
+    /** Sets the listeners: `chosen(signal)`, `force(signal)`, `release(signal)`, `analyse(signal)`. */
     begin(actions) { act = actions; },
     /** After the signals were replaced: finds the chosen one by its name. */
     renew() {

@@ -115,6 +115,7 @@
       line.show();
       if (list.kind === "forced" || list.kind === "failsafe") list.choose();
       trend.collect();
+      analyser.moved();
       setLink();
       redraw();
     },
@@ -126,6 +127,7 @@
     },
     force: edit,
     release,
+    analyse: analyser.add,
   });
   touch.begin({
     say, canForce, change, pathOf, release,
@@ -136,6 +138,8 @@
       choose("all");
     },
   });
+  analyser.begin({ say, redraw });
+  trigger.begin({ say, follow: analyser.follow, stop: analyser.stop });
 
   get("chosen").addEventListener("submit", (event) => {
     event.preventDefault();
@@ -148,6 +152,7 @@
     if (list.chosen) list.toggle(list.chosen);
     showChosen(list.chosen);
   });
+  get("analyse").addEventListener("click", () => analyser.add(list.chosen));
   get("let-go").addEventListener("click", () => {
     list.select(null);
     say("");
@@ -242,6 +247,7 @@
     // The variables of a run have no address and no direction, and cannot be forced.
     document.body.classList.toggle("only-runs", plant.drivers.length > 0 && plant.drivers.every(({ kind }) => kind === "sync"));
     list.renew();
+    analyser.renew();
     pictures.load();
     if (!painted) requestAnimationFrame(() => requestAnimationFrame(() => { painted = performance.now(); }));
   }
@@ -256,11 +262,12 @@
       alarm();
       list.redraw();
       bar.redraw();
+      analyser.redraw();
       if (list.chosen) showChosen(list.chosen);
       const moves = !isOld && pictures.move();
       touch.show();
       // The bar counts on in the past.
-      if (!isOld && (moves || list.isMoving() || bar.moment)) redraw();
+      if (!isOld && (moves || list.isMoving() || analyser.isMoving() || bar.moment)) redraw();
     });
   }
 

@@ -164,14 +164,19 @@ fn trends(archive: &Archive, path: &str) -> Option<Document> {
             .iter()
             .map(|(at, slot)| (*at, slot.map_or(f64::NAN, value)))
             .collect();
-        if points.len() > MOST_POINTS {
+        let is_thin = points.len() > MOST_POINTS;
+        if is_thin {
             points = thinned(&points, (from.max(points[0].0), to.min(last)));
         }
         let (ms, values): (Vec<f64>, Vec<f64>) = points
             .iter()
             .map(|(at, value)| (millis(*at), *value))
             .unzip();
-        Some(json!({ "ms": ms, "values": values }))
+        let mut trend = json!({ "ms": ms, "values": values });
+        if is_thin {
+            trend["is_thin"] = json!(true);
+        }
+        Some(trend)
     };
     let indices: Option<Vec<usize>> = indices.split(',').map(|index| index.parse().ok()).collect();
     let indices = indices.filter(|indices| indices.len() <= MOST_TRENDS)?;

@@ -205,5 +205,5 @@ const trend = (() => {
   }
 
   setInterval(collect, PERIOD);
-  return { open, close, draw, next, collect, get length() { return length; } };
+  return { open, close, draw, next, collect, paintUnknown, get length() { return length; } };
 })();

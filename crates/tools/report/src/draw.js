@@ -284,7 +284,7 @@ function paintAxis(painting, height) {
     // At the ends there is room beyond the traces.
     if (x + half > left + width + MARGIN) ctx.textAlign = "right";
     else if (x - half < 0) ctx.textAlign = "left";
-    const shift = ctx.textAlign === "right" ? MARGIN : ctx.textAlign === "left" ? -MARGIN : 0;
+    const shift = ctx.textAlign === "right" ? MARGIN : ctx.textAlign === "left" ? -Math.min(MARGIN, left) : 0;
     ctx.fillStyle = colours.soft;
     ctx.fillText(text, x + shift, height / 2 - 2);
     ctx.textAlign = "center";

@@ -1,0 +1,322 @@
+//! The logic analyser: signals on one time axis, cursors, their distance, zoom, and the trigger.
+
+use std::path::PathBuf;
+
+use serde_json::{Value, json};
+
+use super::{Machine, choose, open, wait_shown};
+use crate::webdriver::{Browser, shoot};
+use crate::{assert_fits, assert_quiet, middle, wait_said};
+
+const SHIFT: &str = "\u{e008}";
+const LEFT: &str = "\u{e012}";
+const RIGHT: &str = "\u{e014}";
+
+/// A tank whose valve, level and step come back from the outputs.
+const TANK: &str = r#"
+[[signal]]
+name = "Valve command"
+address = "%QX0.0"
+[[signal]]
+name = "Valve"
+address = "%IX0.0"
+[[signal]]
+name = "Set point"
+address = "%QW2"
+type = "INT"
+unit = "mm"
+scale = { raw = [0, 27648], value = [0.0, 500.0] }
+[[signal]]
+name = "Level"
+address = "%IW2"
+type = "INT"
+unit = "mm"
+scale = { raw = [0, 27648], value = [0.0, 500.0] }
+[[signal]]
+name = "Step wanted"
+address = "%QW4"
+type = "INT"
+[[signal]]
+name = "Step"
+address = "%IW4"
+type = "INT"
+"#;
+
+/// The folder for screenshots, if one is wanted.
+fn shots() -> Option<PathBuf> {
+    std::env::var_os("TICKBUS_SCREENSHOTS").map(PathBuf::from)
+}
+
+/// The machine after some edges of each signal.
+fn worked() -> Machine {
+    let machine = Machine::new("modbus-server", "", TANK);
+    for (valve, level, step) in [("1", "0", "1"), ("0", "13824", "2"), ("1", "27648", "5")] {
+        machine.write("0", "0", valve);
+        machine.write("4", "1", level);
+        machine.write("4", "2", step);
+    }
+    machine
+}
+
+/// Puts a signal onto the axis by its key.
+fn add(browser: &Browser, name: &str) {
+    choose(browser, name);
+    browser.run("document.getElementById('list').focus()");
+    browser.keys("a");
+    wait_said(browser, &format!("{name} is on the axis"));
+}
+
+/// Three signals on the axis, with all their edges.
+fn opened(machine: &Machine, width: u32, height: u32) -> Browser {
+    let browser = open(machine, width, height);
+    wait_shown(&browser, "Level", "500.00mm");
+    for name in ["Valve", "Level", "Step"] {
+        add(&browser, name);
+    }
+    browser.wait("analyser.tracks[2].values.includes(5) && analyser.tracks[0].values.length > 2");
+    browser
+}
+
+/// The middle of the axis, as the pointer reaches it.
+fn axis(browser: &Browser) -> (i64, i64) {
+    middle(browser, "#plot")
+}
+
+/// The beginning and the length of the time on the axis.
+fn shown(browser: &Browser) -> (f64, f64) {
+    let view = browser.run("const { begin, end } = analyser.view; return [begin, end - begin]");
+    let number = |at: usize| view[at].as_f64().expect("a number");
+    (number(0), number(1))
+}
+
+fn drag(browser: &Browser, kind: &str, (x, y): (i64, i64), by: i64) {
+    browser.act(&json!([{"type": "pointer", "id": kind, "parameters": {"pointerType": kind}, "actions": [
+        {"type": "pointerMove", "x": x, "y": y, "duration": 0}, {"type": "pointerDown", "button": 0},
+        {"type": "pointerMove", "x": x + by, "y": y, "duration": 60}, {"type": "pointerUp", "button": 0},
+    ]}]));
+}
+
+fn wheel(browser: &Browser, (x, y): (i64, i64), by: i64) {
+    browser.act(&json!([{"type": "wheel", "id": "wheel", "actions": [
+        {"type": "scroll", "x": x, "y": y, "deltaX": 0, "deltaY": by, "duration": 0, "origin": "viewport"},
+    ]}]));
+}
+
+/// Where an edge of a signal on the axis is on the screen, and its time.
+fn edge(browser: &Browser, track: usize, value: i64) -> (i64, i64, f64) {
+    let found = browser.run(&format!(
+        "const {{ times, values }} = analyser.tracks[{track}]; const {{ begin, end }} = analyser.view; \
+         const time = times[values.lastIndexOf({value})]; \
+         const box = document.getElementById('plot').getBoundingClientRect(); \
+         return [Math.round(box.left + (time - begin) / (end - begin) * (box.width - 10)), Math.round(box.top + 52 * {track} + 26), time]"
+    ));
+    (
+        found[0].as_i64().expect("a place"),
+        found[1].as_i64().expect("a place"),
+        found[2].as_f64().expect("a time"),
+    )
+}
+
+fn click_at(browser: &Browser, x: i64, y: i64) {
+    browser.act(&json!([{"type": "pointer", "id": "mouse", "actions": [
+        {"type": "pointerMove", "x": x, "y": y, "duration": 0}, {"type": "pointerDown", "button": 0},
+        {"type": "pointerUp", "button": 0},
+    ]}]));
+}
+
+/// What the cursors read of each signal.
+fn read(browser: &Browser, part: &str) -> Value {
+    browser.run(&format!(
+        "return analyser.tracks.map(({{ parts }}) => parts.{part}.textContent)"
+    ))
+}
+
+#[test]
+fn two_cursors_snap_to_edges_and_tell_the_values_and_the_distance() {
+    let machine = worked();
+    let browser = opened(&machine, 1280, 900);
+    assert_eq!(read(&browser, "now"), json!(["TRUE", "500.00 mm", "5"]));
+    // The view must not move under the pointer.
+    drag(&browser, "mouse", axis(&browser), 8);
+    browser.wait("analyser.view.isHeld");
+    browser.run("document.getElementById('zoom-all').click()");
+    let (x, y, time) = edge(&browser, 1, 250);
+    click_at(&browser, x + 1, y);
+    browser.wait(&format!("bar.moment && bar.moment.ms === {time}"));
+    browser.wait("document.getElementById('link').textContent === 'paused'");
+    assert_eq!(read(&browser, "now"), json!(["FALSE", "250.00 mm", "1"]));
+    let first = browser.run("return bar.moment.tick").as_i64();
+    browser.run("document.getElementById('cursor-2').click()");
+    let (x, y, time) = edge(&browser, 2, 5);
+    click_at(&browser, x - 1, y);
+    browser.wait(&format!(
+        "analyser.second.ms === {time} && analyser.second.tick"
+    ));
+    browser
+        .wait("/distance [\\d,]+ ticks?, /.test(document.getElementById('reading').textContent)");
+    assert_eq!(read(&browser, "then"), json!(["TRUE", "500.00 mm", "5"]));
+    let told = browser.run("return document.getElementById('reading').textContent");
+    let ticks = browser.run("return analyser.second.tick").as_i64();
+    let ticks = ticks.expect("a tick") - first.expect("a tick");
+    let ms = browser.run("return (analyser.second.ms - bar.moment.ms).toFixed(3)");
+    let distance = format!("distance {ticks} ticks, {} ms", ms.as_str().expect("text"));
+    assert!(
+        told.as_str()
+            .expect("text")
+            .replace(',', "")
+            .ends_with(&distance.replace(',', "")),
+        "{told} has {distance}"
+    );
+    shoot(&browser, shots().as_deref(), "analyser.png", false);
+    // The bar's moment is the first cursor, and its steps move it.
+    browser.run("document.getElementById('scrub').focus()");
+    browser.keys(LEFT);
+    browser.wait(&format!(
+        "bar.moment.tick === {} - 1",
+        first.expect("a tick")
+    ));
+    browser.wait("analyser.tracks[1].parts.now.textContent === '0.00 mm'");
+    browser.run("document.getElementById('to-live').click()");
+    browser.wait("!bar.moment && !analyser.view.isHeld");
+    assert_quiet(&browser);
+}
+
+#[test]
+fn the_axis_is_zoomed_and_moved_by_wheel_fingers_and_keys() {
+    let machine = worked();
+    let browser = opened(&machine, 1280, 900);
+    let place = axis(&browser);
+    drag(&browser, "mouse", place, 20);
+    browser.wait("analyser.view.isHeld");
+    let (begin, span) = shown(&browser);
+    drag(&browser, "mouse", place, -100);
+    browser.wait(&format!("analyser.view.begin > {begin}"));
+    let (moved, _) = shown(&browser);
+    let wide = browser.run("return document.getElementById('plot').clientWidth");
+    let by = 100.0 * span / wide.as_f64().expect("a width");
+    assert!((moved - begin - by).abs() < span / 100.0, "{begin} {moved}");
+    wheel(&browser, place, -300);
+    browser.wait(&format!(
+        "analyser.view.end - analyser.view.begin < {span} * 0.8"
+    ));
+    // Two fingers that move apart show less time.
+    let (_, span) = shown(&browser);
+    let (x, y) = place;
+    let finger = |id: &str, from: i64, to: i64| {
+        json!({"type": "pointer", "id": id, "parameters": {"pointerType": "touch"}, "actions": [
+            {"type": "pointerMove", "x": x + from, "y": y, "duration": 0}, {"type": "pointerDown", "button": 0},
+            {"type": "pointerMove", "x": x + to, "y": y, "duration": 80}, {"type": "pointerUp", "button": 0},
+        ]})
+    };
+    browser.act(&json!([finger("one", -50, -150), finger("two", 50, 150)]));
+    browser.wait(&format!(
+        "analyser.view.end - analyser.view.begin < {span} * 0.5"
+    ));
+    assert_eq!(browser.run("return bar.moment"), Value::Null);
+    // By key: all of the time, and from edge to edge.
+    browser.run("document.getElementById('plot').focus()");
+    browser.keys("0");
+    let reach = "plant.drivers[0].past.last - plant.drivers[0].past.first";
+    browser.wait(&format!(
+        "analyser.view.end - analyser.view.begin > ({reach}) * 0.8"
+    ));
+    browser.run("list.select(plant.signals.find((it) => it.name === 'Step'))");
+    browser.run("document.getElementById('plot').focus()");
+    browser.keys(&format!("{SHIFT}{LEFT}"));
+    browser.wait("bar.moment && tickbusPage.value('Step') === 5");
+    browser.keys(&format!("{SHIFT}{LEFT}"));
+    browser.wait("tickbusPage.value('Step') === 2");
+    browser.keys(LEFT);
+    browser.wait("tickbusPage.value('Step') === 1");
+    browser.keys(&format!("{SHIFT}{RIGHT}"));
+    browser.wait("tickbusPage.value('Step') === 2");
+    assert_quiet(&browser);
+}
+
+#[test]
+fn the_trigger_stops_the_view_at_the_tick_of_the_change() {
+    let machine = worked();
+    let browser = opened(&machine, 1280, 900);
+    let wait_for = |name: &str, case: &str, limit: &str| {
+        browser.run(&format!(
+            "const [signal, kind, limit] = ['trigger-signal', 'trigger-case', 'trigger-limit'].map((id) => document.getElementById(id)); \
+             signal.value = plant.keyOf(plant.signals.find((it) => it.name === '{name}')); \
+             kind.value = '{case}'; kind.dispatchEvent(new Event('change')); limit.value = '{limit}'; \
+             document.getElementById('arm').click()"
+        ));
+    };
+    wait_for("Level", "above", "much");
+    wait_said(&browser, "\"much\" is not a number");
+    wait_for("Level", "above", "100");
+    browser.wait("trigger.isArmed");
+    // It is above already, and comes from below later.
+    machine.write("4", "1", "0");
+    machine.write("4", "1", "2765");
+    assert_eq!(browser.run("return trigger.isArmed"), true);
+    machine.write("4", "1", "13824");
+    wait_said(&browser, "Level went above 100 mm at ");
+    browser.wait("bar.moment && tickbusPage.value('Level') === 250");
+    let tick = browser.run("return bar.moment.tick").as_u64();
+    assert_eq!(
+        browser.run("return [trigger.isArmed, analyser.view.isHeld]"),
+        json!([false, true])
+    );
+    // At exactly that tick.
+    browser.run("document.getElementById('step-back').click()");
+    browser.wait(&format!(
+        "bar.moment.tick === {}",
+        tick.expect("a tick") - 1
+    ));
+    assert_eq!(browser.run("return tickbusPage.value('Level') < 100"), true);
+    wait_for("Valve", "falls", "");
+    browser.wait("trigger.isArmed && !bar.moment");
+    machine.write("0", "0", "0");
+    wait_said(&browser, "Valve fell at ");
+    browser.wait("bar.moment && !plant.number(plant.signals.find((it) => it.name === 'Valve'))");
+    assert_quiet(&browser);
+}
+
+#[test]
+fn a_signal_is_dropped_and_leaves_and_the_axis_fits_a_phone_in_the_dark() {
+    let machine = worked();
+    let browser = open(&machine, 1280, 900);
+    wait_shown(&browser, "Level", "500.00mm");
+    let hidden = "document.getElementById('analyser').hidden";
+    assert_eq!(browser.run(&format!("return {hidden}")), true);
+    browser.run(
+        "const data = new DataTransfer(); \
+         const row = Array.from(document.querySelectorAll('.row.signal')).find((it) => it.signal?.name === 'Step'); \
+         const say = (it, name) => it.dispatchEvent(new DragEvent(name, { bubbles: true, cancelable: true, dataTransfer: data })); \
+         say(row, 'dragstart'); const axis = document.getElementById('analyser'); \
+         say(axis, 'dragover'); say(axis, 'drop'); say(row, 'dragend');",
+    );
+    browser.wait(&format!(
+        "!{hidden} && analyser.tracks[0].signal.name === 'Step'"
+    ));
+    browser.wait("analyser.tracks[0].parts.states.title === 'Show Step as a curve'");
+    let dark = json!({"features": [{"name": "prefers-color-scheme", "value": "dark"}]});
+    browser.devtools("Emulation.setEmulatedMedia", &dark);
+    browser.resize(390, 844);
+    browser.go(&machine.url);
+    wait_shown(&browser, "Level", "500.00mm");
+    for name in ["Valve", "Level", "Step"] {
+        browser.run(&format!(
+            "list.select(plant.signals.find((it) => it.name === '{name}')); document.getElementById('analyse').click()"
+        ));
+        wait_said(&browser, &format!("{name} is on the axis"));
+    }
+    browser.wait("analyser.tracks.every(({ values }) => values.length > 2)");
+    browser.run("scrollTo(0, 0)");
+    assert_fits(&browser);
+    shoot(&browser, shots().as_deref(), "analyser_phone.png", false);
+    let small = browser.run(
+        "return Array.from(document.querySelectorAll('#analyser button, #analyser select')).filter((it) => it.offsetParent) \
+         .filter((it) => !it.getAttribute('aria-label') && !it.textContent.trim() && !it.closest('label')).length",
+    );
+    assert_eq!(small, 0, "every control has a name");
+    browser.run("document.querySelector('#tracks .remove').click()");
+    assert_eq!(browser.run("return analyser.tracks.length"), 2);
+    browser.run("for (const it of [1, 2]) document.querySelector('#tracks .remove').click()");
+    browser.wait(hidden);
+    assert_quiet(&browser);
+}

@@ -96,6 +96,14 @@ fn drag(browser: &Browser, kind: &str, (x, y): (i64, i64), by: i64) {
     ]}]));
 }
 
+/// Presses a key while Shift is held.
+fn shifted(browser: &Browser, key: &str) {
+    browser.act(&json!([{"type": "key", "id": "keys", "actions": [
+        {"type": "keyDown", "value": SHIFT}, {"type": "keyDown", "value": key},
+        {"type": "keyUp", "value": key}, {"type": "keyUp", "value": SHIFT},
+    ]}]));
+}
+
 fn wheel(browser: &Browser, (x, y): (i64, i64), by: i64) {
     browser.act(&json!([{"type": "wheel", "id": "wheel", "actions": [
         {"type": "scroll", "x": x, "y": y, "deltaX": 0, "deltaY": by, "duration": 0, "origin": "viewport"},
@@ -222,13 +230,13 @@ fn the_axis_is_zoomed_and_moved_by_wheel_fingers_and_keys() {
     ));
     browser.run("list.select(plant.signals.find((it) => it.name === 'Step'))");
     browser.run("document.getElementById('plot').focus()");
-    browser.keys(&format!("{SHIFT}{LEFT}"));
+    shifted(&browser, LEFT);
     browser.wait("bar.moment && tickbusPage.value('Step') === 5");
-    browser.keys(&format!("{SHIFT}{LEFT}"));
+    shifted(&browser, LEFT);
     browser.wait("tickbusPage.value('Step') === 2");
     browser.keys(LEFT);
     browser.wait("tickbusPage.value('Step') === 1");
-    browser.keys(&format!("{SHIFT}{RIGHT}"));
+    shifted(&browser, RIGHT);
     browser.wait("tickbusPage.value('Step') === 2");
     assert_quiet(&browser);
 }

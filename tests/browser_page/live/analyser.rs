@@ -96,6 +96,16 @@ fn drag(browser: &Browser, kind: &str, (x, y): (i64, i64), by: i64) {
     ]}]));
 }
 
+/// The place of a signal's name in the list.
+fn row_of(browser: &Browser, name: &str) -> (i64, i64) {
+    let place = browser.run(&format!(
+        "const box = {}.parts.name.getBoundingClientRect(); return [Math.round(box.left + 10), Math.round(box.top + 8)]",
+        super::row(name)
+    ));
+    let number = |at: usize| place[at].as_i64().expect("a place");
+    (number(0), number(1))
+}
+
 /// Presses a key while Shift is held.
 fn shifted(browser: &Browser, key: &str) {
     browser.act(&json!([{"type": "key", "id": "keys", "actions": [
@@ -291,13 +301,13 @@ fn a_signal_is_dropped_and_leaves_and_the_axis_fits_a_phone_in_the_dark() {
     wait_shown(&browser, "Level", "500.00mm");
     let hidden = "document.getElementById('analyser').hidden";
     assert_eq!(browser.run(&format!("return {hidden}")), true);
-    browser.run(
-        "const data = new DataTransfer(); \
-         const row = Array.from(document.querySelectorAll('.row.signal')).find((it) => it.signal?.name === 'Step'); \
-         const say = (it, name) => it.dispatchEvent(new DragEvent(name, { bubbles: true, cancelable: true, dataTransfer: data })); \
-         say(row, 'dragstart'); const axis = document.getElementById('analyser'); \
-         say(axis, 'dragover'); say(axis, 'drop'); say(row, 'dragend');",
-    );
+    let (x, y) = row_of(&browser, "Step");
+    browser.act(&json!([{"type": "pointer", "id": "mouse", "actions": [
+        {"type": "pointerMove", "x": x, "y": y, "duration": 0}, {"type": "pointerDown", "button": 0},
+        {"type": "pointerMove", "x": x, "y": y - 40, "duration": 100}, {"type": "pause", "duration": 200},
+        {"type": "pointerMove", "x": 300, "y": 50, "duration": 100}, {"type": "pause", "duration": 200},
+        {"type": "pointerMove", "x": 310, "y": 50, "duration": 100}, {"type": "pointerUp", "button": 0},
+    ]}]));
     browser.wait(&format!(
         "!{hidden} && analyser.tracks[0].signal.name === 'Step'"
     ));

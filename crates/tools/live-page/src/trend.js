@@ -186,11 +186,11 @@ const trend = (() => {
 
   /** Paints the time without a valid value. */
   function paintUnknown(painted, { times, values }, height) {
-    const { ctx, colours, left, width, to } = painted;
+    const { ctx, colours, from, to } = painted;
     values.forEach((value, i) => {
       if (!Number.isNaN(value)) return;
-      const x = left + Math.max(0, times[i]) / to * width;
-      const end = left + Math.min(run.end, times[i + 1] ?? run.end) / to * width;
+      const x = place(painted, Math.max(from, times[i]));
+      const end = place(painted, Math.min(to, run.end, times[i + 1] ?? run.end));
       if (end <= x) return;
       ctx.fillStyle = colours.stale;
       ctx.fillRect(x, 0, end - x, height);

@@ -194,6 +194,12 @@ fn two_cursors_snap_to_edges_and_tell_the_values_and_the_distance() {
         first.expect("a tick")
     ));
     browser.wait("analyser.tracks[1].parts.now.textContent === '0.00 mm'");
+    // It is dragged, and is a tick in the end.
+    let (x, y, time) = edge(&browser, 1, 250);
+    drag(&browser, "mouse", (x, y), 400);
+    browser.wait(&format!("bar.moment.ms > {time}"));
+    browser
+        .wait("/distance −[\\d,]+ ticks, −/.test(document.getElementById('reading').textContent)");
     browser.run("document.getElementById('to-live').click()");
     browser.wait("!bar.moment && !analyser.view.isHeld");
     assert_quiet(&browser);

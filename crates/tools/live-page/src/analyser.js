@@ -511,7 +511,7 @@ const analyser = (() => {
       look(fixed - (is[0] + is[1]) / 2 / width() * length, length);
     } else if (gesture.kind === "first" || gesture.kind === "second") {
       put(gesture.kind === "second", snapped(event));
-    } else if (gesture.kind === "pan" || Math.abs(x - gesture.from[0]) > 5) {
+    } else if (gesture.kind === "pan" || gesture.kind === "tap" && Math.abs(x - gesture.from[0]) > 5) {
       gesture.kind = "pan";
       look(gesture.begin - (x - gesture.from[0]) / width() * gesture.span, span);
     }
@@ -521,8 +521,11 @@ const analyser = (() => {
     plot.addEventListener(name, (event) => {
       if (!pointers.delete(event.pointerId)) return;
       if (name === "pointerup" && gesture?.kind === "tap") put(isSecond || event.shiftKey, snapped(event));
+      const isMoved = gesture?.kind === "first" && pending !== null;
       // The finger that stays after two does nothing.
       gesture = pointers.size ? { kind: "none" } : null;
+      // To the tick itself.
+      if (isMoved) put(false, pending);
     });
   }
 

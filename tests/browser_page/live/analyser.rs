@@ -142,7 +142,7 @@ fn click_at(browser: &Browser, x: i64, y: i64) {
     ]}]));
 }
 
-/// What the cursors read of each signal.
+/// The text of a part of each track.
 fn read(browser: &Browser, part: &str) -> Value {
     browser.run(&format!(
         "return analyser.tracks.map(({{ parts }}) => parts.{part}.textContent)"
@@ -322,6 +322,9 @@ fn a_signal_is_dropped_and_leaves_and_the_axis_fits_a_phone_in_the_dark() {
     browser.devtools("Emulation.setEmulatedMedia", &dark);
     browser.resize(390, 844);
     browser.go(&machine.url);
+    // Rows below the screen are not drawn.
+    browser.wait("plant.signals.length > 0");
+    browser.run("document.getElementById('list').scrollIntoView()");
     wait_shown(&browser, "Level", "500.00mm");
     for name in ["Valve", "Level", "Step"] {
         browser.run(&format!(

@@ -10,7 +10,7 @@ mod open;
 #[cfg(not(feature = "page"))]
 pub(crate) use none::{Place, show, show_run};
 #[cfg(feature = "page")]
-pub(crate) use open::{Place, options, show, show_run};
+pub(crate) use open::{Place, options, picture_at, show, show_recording, show_run};
 
 #[cfg(all(feature = "doors", not(feature = "page")))]
 pub(crate) use none::url;

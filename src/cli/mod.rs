@@ -44,6 +44,7 @@ mod reading;
 mod report;
 mod run;
 mod schema;
+mod show;
 mod studio;
 mod sync;
 mod test;
@@ -102,6 +103,7 @@ enum Command {
     Report(report::Arguments),
     Run(run::Arguments),
     Schema(schema::Arguments),
+    Show(show::Arguments),
     Studio(studio::Arguments),
     Sync(sync::Arguments),
     Test(test::Arguments),
@@ -228,6 +230,7 @@ fn run(kinds: &'static Kinds, arguments: Vec<OsString>) -> u8 {
         Command::Report(arguments) => report::run(&arguments),
         Command::Run(arguments) => run::run(&arguments, kinds),
         Command::Schema(arguments) => schema::run(&arguments, kinds),
+        Command::Show(arguments) => show::run(&arguments, kinds),
         Command::Studio(arguments) => studio::run(&arguments, kinds),
         Command::Sync(arguments) => sync::run(&arguments, kinds),
         Command::Test(arguments) => test::run(&arguments, kinds),

@@ -8,7 +8,7 @@ use tickbus_base::time::Monotonic;
 use tickbus_driver::{Line, Watch};
 use tickbus_driver_cfg::Config;
 use tickbus_live_page::picture::{self, Picture};
-use tickbus_live_page::{LivePage, Member, Options};
+use tickbus_live_page::{LivePage, Member, Options, Recorded};
 use tickbus_net::Address;
 use tickbus_studio::{Running, Seat, Studios};
 use tickbus_virtual_time::Controls;
@@ -159,6 +159,24 @@ pub(crate) fn show_run(
     })
 }
 
+/// Shows a recording on a page at `listen` until the returned place is dropped; `announce` receives the address.
+pub(crate) fn show_recording(
+    recorded: Recorded,
+    listen: &Address,
+    announce: impl FnOnce(&str),
+) -> Result<Place, PageError> {
+    let (open, _) = open("recording", (listen, "--page 127.0.0.1:0"), None)?;
+    let member = open.page.join_recording(recorded);
+    // Nothing can be forced, so nobody needs the token.
+    let (plain, _) = open.url.split_once('#').unwrap_or((&open.url, ""));
+    announce(plain);
+    Ok(Place {
+        seat: None,
+        member: Some(member),
+        open: Some(open),
+    })
+}
+
 /// Returns the present page, or a new one at `asked`, and whether it is new; `any` is the setting for a port that the system chooses, for the
 /// error message.
 fn open(
@@ -210,13 +228,26 @@ fn open(
 /// Reads the picture of a driver. Mistakes in it are logged, and the rest of the picture works.
 fn read_picture(config: &Config, file: &Path) -> Result<Picture, PageError> {
     let path = config.folder().join(file);
-    let wrong = |what: String| {
-        let (cfg, path) = (config.path.display(), path.display());
-        PageError::WrongInput(format!("{cfg}: the picture \"{path}\" {what}"))
-    };
-    let size = fs::metadata(&path).map_err(|error| {
+    let signals = config.table.signals.iter();
+    let signals: Vec<&str> = signals.map(|signal| signal.name.as_str()).collect();
+    let picture = picture_at(&path, "relative to the driver.cfg", &signals)
+        .map_err(|what| PageError::WrongInput(format!("{}: {what}", config.path.display())))?;
+    for mistake in &picture.mistakes {
+        log::warn!("{}: {mistake}", path.display());
+    }
+    for left_out in &picture.left_out {
+        log::info!("{}: left out: {left_out}", path.display());
+    }
+    Ok(picture)
+}
+
+/// Reads a picture that moves with these signals, or says what is wrong with it as a whole; `place` says from where its
+/// path counts.
+pub(crate) fn picture_at(path: &Path, place: &str, signals: &[&str]) -> Result<Picture, String> {
+    let wrong = |what: String| format!("the picture \"{}\" {what}", path.display());
+    let size = fs::metadata(path).map_err(|error| {
         wrong(format!(
-            "cannot be read ({error}); name an SVG file, relative to the driver.cfg"
+            "cannot be read ({error}); name an SVG file, {place}"
         ))
     })?;
     if size.len() > LARGEST {
@@ -225,16 +256,7 @@ fn read_picture(config: &Config, file: &Path) -> Result<Picture, PageError> {
             size.len()
         )));
     }
-    let text = fs::read_to_string(&path)
+    let text = fs::read_to_string(path)
         .map_err(|error| wrong(format!("cannot be read ({error}); save it as plain SVG")))?;
-    let signals = config.table.signals.iter();
-    let signals: Vec<&str> = signals.map(|signal| signal.name.as_str()).collect();
-    let picture = picture::read(&text, &signals).map_err(|mistake| wrong(mistake.to_string()))?;
-    for mistake in &picture.mistakes {
-        log::warn!("{}: {mistake}", path.display());
-    }
-    for left_out in &picture.left_out {
-        log::info!("{}: left out: {left_out}", path.display());
-    }
-    Ok(picture)
+    picture::read(&text, signals).map_err(|mistake| wrong(mistake.to_string()))
 }

@@ -1,5 +1,5 @@
 //! The served pages in a browser: the patch bay shows and patches the laboratory; the live page (`live`) shows a
-//! driver, or a run (`run`).
+//! driver, a run (`run`), or a recording (`show`).
 //!
 //! Not part of a plain `cargo test`, because it needs Chromium and chromedriver:
 //! `cargo test --features page --test browser_page` runs it.
@@ -15,6 +15,7 @@ mod commands;
 mod edited;
 mod live;
 mod run;
+mod show;
 mod studio;
 #[cfg(feature = "opcua")]
 mod studio_tags;

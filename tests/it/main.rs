@@ -36,6 +36,8 @@ mod record;
 mod replies;
 mod report;
 mod sessions;
+#[cfg(feature = "page")]
+mod show;
 mod sweep;
 mod sync;
 #[cfg(all(unix, feature = "page"))]

@@ -201,6 +201,28 @@ impl Archive {
         }
     }
 
+    /// Notes that a recorded signal which tells of a fault has gone on, or off, at a tick.
+    pub(crate) fn note_turn(&self, (tick, at): (u64, Nanos), name: &str, begins: bool) {
+        let marks = &mut self.notes().marks;
+        if marks.len() == MOST {
+            marks.pop_front();
+        }
+        marks.push_back(Mark {
+            tick,
+            at: Some(at),
+            force: None,
+            name: name.to_owned(),
+            text: name.to_owned(),
+            begins,
+        });
+    }
+
+    /// The rows of the last tick.
+    pub(crate) fn last_rows(&self) -> Vec<Row> {
+        let tick = self.history.at(Moment::Tick(u64::MAX));
+        tick.map_or_else(Vec::new, |tick| self.rows(&tick, &[]))
+    }
+
     /// Notes the state of the line; `now` is the time on the clock of the line.
     pub(crate) fn note_line(&self, link: &Link, now: Nanos) {
         let Some(span) = self.history.span() else {

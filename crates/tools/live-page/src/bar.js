@@ -27,6 +27,7 @@ const bar = (() => {
 
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { colours = null; });
 
+  const isRecording = ({ kind }) => kind === "recording";
   const path = (driver, rest) => `/history/${driver.id}/${rest}`;
 
   /** The place of the shown moment in another driver's time. */
@@ -82,6 +83,8 @@ const bar = (() => {
 
   /** Returns to the present. */
   function live() {
+    // A recording has no present; its end is the newest moment.
+    if (lead && isRecording(lead)) return show(`at/${lead.past.last}`);
     wanted = isBusy ? { isLive: true } : null;
     if (!isBusy) leave();
   }
@@ -198,7 +201,9 @@ const bar = (() => {
     }
     lead ??= plant.drivers.find(({ past }) => past) ?? null;
     get("bar").hidden = !lead?.past;
-    document.body.classList.toggle("is-past", Boolean(moment));
+    const isFile = Boolean(lead?.past) && isRecording(lead);
+    if (isFile && !moment && !isBusy) show(`at/${lead.past.last}`);
+    document.body.classList.toggle("is-past", Boolean(moment) && !isFile);
     if (!lead?.past) return;
     const { first, last, isCut } = lead.past;
     range.min = first;
@@ -208,11 +213,11 @@ const bar = (() => {
     const now = plant.now(lead);
     const ago = now - at;
     const span = words.span(Math.max(0, last - first));
-    range.setAttribute("aria-valuetext", moment ? `${words.moment(at)}, tick ${moment.tick}, ${words.span(ago)} ago` : "live");
-    get("pause").hidden = Boolean(moment);
-    get("to-live").hidden = !moment;
+    range.setAttribute("aria-valuetext", moment ? `${words.moment(at)}, tick ${moment.tick}${isFile ? "" : `, ${words.span(ago)} ago`}` : "live");
+    get("pause").hidden = Boolean(moment) || isFile;
+    get("to-live").hidden = !moment || isFile;
     if (moment) text(get("to-live"), `Live: +${words.span(ago)}`);
-    text(get("moment"), moment ? `${words.moment(at)} · tick ${moment.tick.toLocaleString("en")}` : isCut ? `the last ${span} kept` : `${span} recorded`);
+    text(get("moment"), moment ? `${words.moment(at)}${isFile ? ` of ${words.moment(last)}` : ""} · tick ${moment.tick.toLocaleString("en")}` : isCut ? `the last ${span} kept` : `${span} recorded`);
     const chosen = act.chosen();
     text(get("goal-signal"), chosen ? `change of ${chosen.name}` : "change of a signal");
     if (moment && moment.ms < first) act.say("The oldest moments have left the memory; the page shows the oldest that is left.");

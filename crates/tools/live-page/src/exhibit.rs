@@ -1,4 +1,4 @@
-//! The exhibits of the page: a driver with its line, or a run on virtual time.
+//! The exhibits of the page: a driver with its line, a run on virtual time, or a recording.
 
 use std::fmt;
 use std::sync::Arc;

@@ -4,7 +4,7 @@
 //! page's thread requests copies of the ticks, and compares them with the known state: a viewer gets only the changes
 //! since the last look. Another thread answers requests about the past, from the history that the driver's recorder
 //! feeds. Signals are forced by faults of the kind "stuck". The server of a run on virtual time joins by
-//! its [`Controls`](tickbus_virtual_time::Controls), and is only shown. docs/live-page.md describes the page, for users
+//! its [`Controls`](tickbus_virtual_time::Controls), and is only shown; so is a [`Recorded`] file. docs/live-page.md describes the page, for users
 //! and for programs.
 
 mod archive;
@@ -21,6 +21,7 @@ mod order;
 mod page;
 mod past;
 pub mod picture;
+mod recorded;
 mod run;
 mod sheet;
 mod shown;
@@ -29,4 +30,5 @@ mod value;
 pub use options::Options;
 pub use order::{Order, order};
 pub use page::{LivePage, Member};
+pub use recorded::Recorded;
 pub use value::parse as parse_value;

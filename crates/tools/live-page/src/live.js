@@ -16,6 +16,9 @@
     get("status").classList.toggle("bad", isBad);
   }
 
+  /** True if the page shows a file, and nothing runs. */
+  const isRecording = () => plant.drivers.some(({ kind }) => kind === "recording");
+
   function show(element, text) {
     if (element.textContent !== text) element.textContent = text;
   }
@@ -52,7 +55,9 @@
 
   /** True if a signal can be forced now; says why if not. */
   function canForce(signal) {
-    if (!mayForce) {
+    if (isRecording()) {
+      say("Nothing can be forced: the page shows a recording.", true);
+    } else if (!mayForce) {
       say("Read-only: open the address that was printed, with its token, to force a signal.", true);
     } else if (!signal.isWritable) {
       const why = signal.driver.kind === "sync" ? "that would change the run" : "the program only observes this bus";
@@ -246,6 +251,7 @@
     show(get("counts"), plant.drivers.length > 1 ? `${plant.drivers.length} drivers` : "");
     // The variables of a run have no address and no direction, and cannot be forced.
     document.body.classList.toggle("only-runs", plant.drivers.length > 0 && plant.drivers.every(({ kind }) => kind === "sync"));
+    document.body.classList.toggle("is-recording", isRecording());
     list.renew();
     analyser.renew();
     pictures.load();
@@ -273,8 +279,8 @@
 
   /** Shows whether the page is live. */
   function setLink() {
-    show(get("link"), isOld ? "no connection" : bar.moment ? "paused" : "live");
-    get("link").className = isOld ? "tag bad" : bar.moment ? "tag stale" : "tag good";
+    show(get("link"), isOld ? "no connection" : isRecording() ? "recording" : bar.moment ? "paused" : "live");
+    get("link").className = isOld ? "tag bad" : isRecording() ? "tag" : bar.moment ? "tag stale" : "tag good";
   }
 
   room.listen({

@@ -24,9 +24,9 @@ const outage = (() => {
     return ["PLC", "Cable", "Driver", driver.role === "observer" ? "Program" : "Machine"];
   }
 
-  /** Makes the picture of a driver's line; a run on virtual time has none. */
+  /** Makes the picture of a driver's line; a run on virtual time and a recording have none. */
   function card(driver, parent) {
-    if (driver.kind === "sync") return null;
+    if (driver.kind === "sync" || driver.kind === "recording") return null;
     const row = make("ol", "way", parent);
     row.setAttribute("aria-label", "The way to the machine");
     const boxes = names(driver).map((name) => {

@@ -16,6 +16,7 @@ use crate::keeper::{Inbox, Keeper, Wish};
 use crate::model::Shared;
 use crate::options::Options;
 use crate::past::{Door, Past};
+use crate::recorded::{Recorded, ShownRecording};
 use crate::run::ShownRun;
 use crate::shown::Shown;
 
@@ -86,6 +87,12 @@ impl LivePage {
     pub fn join_run(&self, name: &str, controls: Controls) -> Member {
         let now = self.clock.now();
         self.add(1, |id| Box::new(ShownRun::new(id, name, controls, now)))
+    }
+
+    /// Shows a recording, until the returned value is dropped.
+    pub fn join_recording(&self, recorded: Recorded) -> Member {
+        let now = self.clock.now();
+        self.add(1, |id| Box::new(ShownRecording::new(id, recorded, now)))
     }
 
     fn add(&self, id: i32, make: impl FnOnce(i32) -> Box<dyn Exhibit>) -> Member {

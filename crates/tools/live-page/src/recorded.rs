@@ -149,13 +149,16 @@ impl Recorded {
     }
 }
 
-/// Reads all ticks; returns their number, number and time of the first one, and why it ended if the file is damaged.
+/// The number of ticks, number and time of the first one, and why reading ended if the file is damaged.
+type Filled = (u64, (u64, Nanos), Option<String>);
+
+/// Reads all ticks.
 fn fill(
     archive: &Archive,
     recording: &mut Recording,
     order: &[usize],
     faults: &[usize],
-) -> Result<(u64, (u64, Nanos), Option<String>), Mistake> {
+) -> Result<Filled, Mistake> {
     let mut read = Tick::new(recording.columns());
     let mut moved = read.clone();
     let is_in_order = order.is_sorted();

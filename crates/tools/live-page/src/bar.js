@@ -112,7 +112,8 @@ const bar = (() => {
     const signal = act.chosen();
     if (goal === "signal" && !signal) return act.say("Choose the signal whose change you look for.", true);
     const driver = goal === "signal" ? signal.driver : lead;
-    const from = driver.moment?.tick ?? (driver.past ? driver.past.tick + 1 : 0);
+    // The present is later than what the page has heard of.
+    const from = driver.moment?.tick ?? Number.MAX_SAFE_INTEGER;
     const what = goal === "signal" ? signal.index : goal;
     const name = goal === "signal" ? `change of ${signal.name}` : goal;
     try {

@@ -32,7 +32,7 @@ const ACTIONS: &[(&str, Kind)] = &[
     ("y", Kind::Number),
 ];
 
-/// What makes an element a control: a push-button, which is held, and a switch, which stays.
+/// The controls: a push-button, which is held, and a switch, which stays.
 const PRESS: &str = "press";
 const SWITCH: &str = "switch";
 

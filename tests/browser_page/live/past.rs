@@ -181,6 +181,12 @@ fn an_outage_is_found_and_the_time_before_it_is_saved() {
     // A restart begins another past.
     machine.restart();
     browser.wait("!bar.moment && document.getElementById('link').textContent === 'live'");
+    // And the bar goes on after this connection, which has the same drivers.
+    browser.wait("plant.drivers[0].past?.tick > 0");
+    click(&browser, "#pause");
+    browser.wait("bar.moment");
+    click(&browser, "#to-live");
+    browser.wait("!bar.moment");
 }
 
 #[test]

@@ -102,7 +102,7 @@ const analyser = (() => {
 
   // The signals.
 
-  const trackOf = (signal) => ({ key: plant.keyOf(signal), signal, times: [], values: [], from: Infinity, until: -Infinity, isThin: false, states: null, kinds: new Map() });
+  const trackOf = (signal) => ({ key: plant.keyOf(signal), signal, times: [], values: [], from: Infinity, until: -Infinity, isThin: false, states: null });
 
   function add(signal) {
     if (!signal) return act.say("Choose a signal first.", true);
@@ -339,6 +339,16 @@ const analyser = (() => {
 
   // Drawing.
 
+  /** True for whole numbers of which few differ: states, rather than a curve. */
+  function isFew(values) {
+    const few = new Set();
+    for (const value of values) {
+      if (Number.isNaN(value)) continue;
+      if (!Number.isInteger(value) || few.add(value).size > STATES) return false;
+    }
+    return true;
+  }
+
   const isStates = (track) => track.states ?? (track.isFew && !track.signal.unit && !/REAL|TIME|BOOL/.test(track.signal.type));
 
   function text(element, value) {
@@ -388,7 +398,7 @@ const analyser = (() => {
     const seen = { times: times.slice(start, stop), values: values.slice(start, stop) };
     trend.paintUnknown(painted, seen, ROW - 1);
     ctx.restore();
-    track.isFew = new Set(seen.values).size <= STATES && seen.values.every((value) => Number.isNaN(value) || Number.isInteger(value));
+    track.isFew = isFew(seen.values);
     track.range = "";
     if (signal.isBool) {
       paintBool(painted, seen, high, low);
@@ -415,9 +425,8 @@ const analyser = (() => {
     const spans = [];
     values.forEach((value, i) => {
       if (Number.isNaN(value)) return;
-      const { kinds } = track;
-      if (!kinds.has(value)) kinds.set(value, ["idle", "step", "good"][kinds.size % 3]);
-      spans.push([times[i], times[i + 1] ?? run.end, kinds.get(value), words.value({ ...track.signal, value })]);
+      const kind = ["idle", "step", "good"][Math.abs(Math.trunc(value)) % 3];
+      spans.push([times[i], times[i + 1] ?? run.end, kind, words.value({ ...track.signal, value })]);
     });
     return spans;
   }
@@ -569,7 +578,8 @@ const analyser = (() => {
   for (const [id, action] of Object.entries(buttons)) {
     get(id).addEventListener("click", () => {
       if (bar.lead?.past) action();
-      if (get(id).hidden) plot.focus({ preventScroll: true });
+      // It may vanish with the next frame.
+      requestAnimationFrame(() => { if (get(id).hidden) plot.focus({ preventScroll: true }); });
     });
   }
 

@@ -306,19 +306,20 @@ impl Archive {
 
     /// All marks, with their times as far as the history has them.
     fn timed_marks(&self) -> Vec<Mark> {
-        self.last_marks(usize::MAX)
+        self.last_marks(usize::MAX, |_| true)
     }
 
-    /// The last `most` marks, with their times as far as the history has them.
-    fn last_marks(&self, most: usize) -> Vec<Mark> {
+    /// The last `most` of the marks that are wanted, with their times as far as the history has them.
+    fn last_marks(&self, most: usize, is_wanted: impl Fn(&Mark) -> bool) -> Vec<Mark> {
         let Some(Span { last, .. }) = self.history.span() else {
             return Vec::new();
         };
         let mut marks: Vec<Mark> = {
             let notes = self.notes();
-            let skipped = notes.marks.len().saturating_sub(most);
-            notes.marks.iter().skip(skipped).cloned().collect()
+            let wanted = notes.marks.iter().rev().filter(|mark| is_wanted(mark));
+            wanted.take(most).cloned().collect()
         };
+        marks.reverse();
         // Each time is looked for once, without the lock, since that decodes a part of the history.
         let mut found = BTreeMap::new();
         for mark in marks

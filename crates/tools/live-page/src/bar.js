@@ -55,6 +55,15 @@ const bar = (() => {
     if (!moment) {
       offsets = new Map(plant.drivers.filter(({ past }) => past).map((driver) => [driver.id, driver.past.last - lead.past.last]));
     }
+    try {
+      await showWanted();
+    } finally {
+      isBusy = false;
+    }
+    if (wanted?.isLive) leave();
+  }
+
+  async function showWanted() {
     while (wanted && !wanted.isLive) {
       const { place, isStep, own } = wanted;
       wanted = null;
@@ -77,8 +86,6 @@ const bar = (() => {
       frames.push(performance.now() - begun);
       if (frames.length > 1000) frames.shift();
     }
-    isBusy = false;
-    if (wanted?.isLive) leave();
   }
 
   /** Returns to the present. */

@@ -165,7 +165,7 @@ const line = (() => {
       own.it.classList.toggle("trouble", state !== "running");
       say(own.reason, line.reason || "no reason known");
       say(own.since, `${line.since_ms === undefined ? "" : `for ${words.span(since(line))}, `}cause ${line.cause}, data ${line.status}${isSilent(line) ? `; the simulation has not ticked for ${words.span(line.silence_ms)}` : ""}`);
-      outage.show(own.way, line);
+      outage.show(own.way, line, driver);
       if (driver.kind === "recording") say(own.since, `data ${line.status}`);
       // A forced value that was released is no longer worth a row.
       faults(own, (line.faults ?? []).filter(({ name, phase }) => phase !== "over" || !name.startsWith("forced: ")));

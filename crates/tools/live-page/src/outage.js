@@ -135,7 +135,10 @@ const outage = (() => {
   function showEvents(own) {
     const { line, list } = own;
     own.more.hidden = !line.events.length;
-    const rows = line.events.map((event, i) => [clock(own, event.ago_ms), eventName(event, line.events[i - 1]), event.text]).reverse();
+    const rows = line.events.map((event, i) => {
+      const before = line.events.slice(0, i).findLast(({ kind }) => !/^(fault|settings)/.test(kind));
+      return [clock(own, event.ago_ms), eventName(event, before), event.text];
+    }).reverse();
     const key = JSON.stringify(rows);
     if (own.key === key) return;
     own.key = key;
@@ -148,9 +151,10 @@ const outage = (() => {
     }
   }
 
-  /** Shows a line, at the moment that the page shows. */
-  function show(own, line) {
+  /** Shows the line of a driver, which is another object after each connection, at the moment that the page shows. */
+  function show(own, line, driver) {
     if (!own) return;
+    own.driver = driver;
     if (line.heard !== own.line?.heard) own.heard = Date.now();
     own.line = { ...line, events: line.events ?? [], texts: line.texts ?? {} };
     line = own.line;
@@ -166,7 +170,7 @@ const outage = (() => {
     own.told.hidden = !wrong;
     const since = wrong ? clock(own, wrong.isOwn ? line.silence_ms : begun(line)) : "";
     // The text stays the same during an outage, so that it is read aloud once.
-    if (wrong?.what !== own.what) Object.assign(own, { what: wrong?.what, since });
+    if (!line.isPast && wrong?.what !== own.what) Object.assign(own, { what: wrong?.what, since });
     if (wrong) say(own.told, `${wrong.what}, since ${line.isPast ? since : own.since}. ${wrong.act}`);
     else say(own.told, "");
     // Once open, it stays as the viewer has it.

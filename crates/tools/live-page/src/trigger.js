@@ -6,6 +6,8 @@ const trigger = (() => {
   const get = (id) => document.getElementById(id);
   /** The time between two looks, in milliseconds. */
   const PERIOD = 100;
+  /** Later than any tick, in milliseconds: a page in the background hears of no newer ones, and yet the trigger sees them. */
+  const FAR = 1e12;
   /** By name: whether a change from one value to another is meant, and the words for it. A time without a value is NaN. */
   const CASES = {
     rises: { fits: (was, is) => is > was, done: "rose" },
@@ -38,6 +40,7 @@ const trigger = (() => {
   function arm() {
     const signal = signals.find((it) => plant.keyOf(it) === get("trigger-signal").value);
     if (!signal?.driver.past) return act.say("Put a signal on the axis first.", true);
+    if (signal.driver.kind === "recording") return act.say("A recording has ended: go to its edges with “edge ▸”, or with “Jump to”.", true);
     const text = get("trigger-limit").value.trim().replace(",", ".").replace("−", "-");
     const bools = { TRUE: 1, FALSE: 0 };
     const limit = hasLimit() ? (bools[text.toUpperCase()] ?? (text === "" ? NaN : Number(text))) : 0;
@@ -58,7 +61,7 @@ const trigger = (() => {
     const own = armed;
     const { signal } = own;
     try {
-      const answer = await room.ask(`/trend/${signal.driver.id}/${signal.index}/${own.until}/${signal.driver.past.last + 60000}`);
+      const answer = await room.ask(`/trend/${signal.driver.id}/${signal.index}/${own.until}/${FAR}`);
       if (answer.ok && armed === own) take(own, await answer.json());
     } catch {
       // The page says if the server does not answer; the next look sees what this one missed.
@@ -103,6 +106,9 @@ const trigger = (() => {
           act.say("The trigger's signal has left the axis; it waits no more.", true);
           disarm();
         }
+        // After a restart the time begins again.
+        const last = armed?.signal.driver.past?.last ?? 0;
+        if (armed && last < armed.until) Object.assign(armed, { until: last, was: NaN });
       }
       const chosen = get("trigger-signal").value;
       get("trigger-signal").replaceChildren(...signals.map((signal) => new Option(signal.name, plant.keyOf(signal))));

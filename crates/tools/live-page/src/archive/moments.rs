@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::LinkState;
 
-use super::{Archive, Mark, millis};
+use super::{Archive, FORCE, Mark, millis};
 use crate::events::{self, Event};
 
 impl Archive {
@@ -37,16 +37,24 @@ impl Archive {
     pub(crate) fn fault_events(&self) -> Vec<Event> {
         let span = self.history.span();
         span.map_or_else(Vec::new, |span| {
-            events_of(&self.last_marks(events::MOST), span.last.1)
+            events_of(&self.last_marks(events::MOST, is_fault), span.last.1)
         })
     }
 }
 
-/// The marks up to a time as events.
+/// True for a fault. What is forced, a push-button for example, is no event of the line.
+fn is_fault(mark: &Mark) -> bool {
+    !mark.name.starts_with(FORCE)
+}
+
+/// The faults up to a time as events.
 fn events_of(marks: &[Mark], time: Nanos) -> Vec<Event> {
-    let timed = marks.iter().filter_map(|mark| {
-        let at = mark.at.filter(|at| *at <= time)?;
-        Some(Event::fault(mark.begins, &mark.text, time - at))
-    });
+    let timed = marks
+        .iter()
+        .filter(|mark| is_fault(mark))
+        .filter_map(|mark| {
+            let at = mark.at.filter(|at| *at <= time)?;
+            Some(Event::fault(mark.begins, &mark.text, time - at))
+        });
     events::last(timed.collect())
 }

@@ -185,7 +185,12 @@ fn a_moment_has_the_line_and_the_events_before_it() {
         &link(LinkState::Failed, Cause::Link, "still broken", 15),
         now,
     );
-    archive.note_faults(&[forced(1, Phase::Active, 12, 12)], 0);
+    let leak = FaultStatus {
+        name: "leak".to_owned(),
+        ..forced(1, Phase::Active, 12, 12)
+    };
+    // A push-button that is held is no event of the line.
+    archive.note_faults(&[leak, forced(2, Phase::Active, 13, 13)], 0);
     let kinds = |millis| {
         let line = archive.line_at(Nanos::from_millis(millis))?;
         let events = line["events"].as_array()?.iter();

@@ -190,6 +190,31 @@ fn an_outage_is_found_and_the_time_before_it_is_saved() {
 }
 
 #[test]
+fn a_new_connection_with_the_same_run_leaves_the_moment_that_is_shown() {
+    let machine = Machine::rig();
+    let browser = open(&machine, 1280, 900);
+    browser.wait("bar.lead?.past.tick > 0");
+    browser.run(
+        "window.full = 0; window.lead = bar.lead; const hear = plant.hear; \
+         plant.hear = (text) => { window.full += JSON.parse(text).full ? 1 : 0; return hear(text); }",
+    );
+    click(&browser, "#pause");
+    browser.wait("bar.moment");
+    let tick = browser.run("return bar.moment.tick");
+    // As when the reader comes back from another tab.
+    browser.run("document.dispatchEvent(new Event('visibilitychange'))");
+    browser.wait("window.full > 0");
+    assert_eq!(
+        browser.run("await new Promise(requestAnimationFrame); return bar.moment?.tick"),
+        tick
+    );
+    assert_eq!(browser.run("return bar.lead === window.lead"), true);
+    click(&browser, "#to-live");
+    browser.wait("!bar.moment && plant.signals.every((it) => it.value === it.live[0])");
+    assert_quiet(&browser);
+}
+
+#[test]
 fn a_thousand_signals_are_scrubbed() {
     let mut signals = String::new();
     for n in 0..500 {

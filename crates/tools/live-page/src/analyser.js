@@ -48,7 +48,7 @@ const analyser = (() => {
   }
   const width = () => Math.max(20, plot.clientWidth - MARGIN);
   const timeAt = (x) => view().begin + x / width() * span;
-  const first = () => pending ?? bar.moment?.ms ?? null;
+  const first = () => pending?.ms ?? bar.moment?.ms ?? null;
 
   /** A length that the axis can have. */
   function fitting(length) {
@@ -236,11 +236,17 @@ const analyser = (() => {
   /** True if the value changed there, from one that was valid. */
   const isEdge = ({ values }, i) => i > 0 && !Number.isNaN(values[i]) && !Number.isNaN(values[i - 1]);
 
-  /** The time of the edge nearest to the pointer, of the signal below it if it has one that near; else its own time. */
+  /** Where an edge of a track is: in the lead's time, and in its own driver's, since the lead may have no tick there. */
+  function edgeOf({ times, signal: { driver } }, i) {
+    const ms = times[i] - bar.offset(driver);
+    return { ms, own: driver === bar.lead ? null : { driver, place: `at/${times[i]}`, ms } };
+  }
+
+  /** The edge nearest to the pointer, of the signal below it if it has one that near; else the pointer's time. */
   function snapped(event) {
     const time = timeAt(xOf(event));
     const own = tracks[Math.floor((event.clientY - plot.getBoundingClientRect().top) / ROW)];
-    return nearest(own ? [own] : [], time) ?? nearest(tracks, time) ?? time;
+    return nearest(own ? [own] : [], time) ?? nearest(tracks, time) ?? { ms: time };
   }
 
   /** The edge nearest to a time, if there is one within a few pixels. */
@@ -252,32 +258,33 @@ const analyser = (() => {
       for (const i of [at, at + 1]) {
         if (i >= track.times.length || !isEdge(track, i)) continue;
         const far = Math.abs(track.times[i] - offset - time);
-        if (far < least) [best, least] = [track.times[i] - offset, far];
+        if (far < least) [best, least] = [edgeOf(track, i), far];
       }
     }
     return best;
   }
 
-  /** Places a cursor; the first one pauses the page at its time. */
-  function put(isOther, ms) {
+  /** Places a cursor at a time or an edge; the first one pauses the page there. */
+  function put(isOther, at) {
     const { past } = bar.lead;
-    const time = Math.min(Math.max(ms, past.first), past.last);
-    if (isOther) return putSecond(`at/${time}`, time);
+    const time = Math.min(Math.max(at.ms, past.first), past.last);
+    if (isOther) return putSecond(`at/${time}`, time, Boolean(at.own));
     if (held === null) held = plant.now(bar.lead);
-    pending = time;
+    pending = { ms: time, own: at.own };
     changed();
-    return bar.show(`at/${time}`);
+    return bar.show(`at/${time}`, false, at.own);
   }
 
-  async function putSecond(place, ms = second?.ms) {
+  /** Places the second cursor at a tick of the lead, or if `isExact` at `ms`, where the edge of another driver is. */
+  async function putSecond(place, ms = second?.ms, isExact = false) {
     if (held === null) held = plant.now(bar.lead);
     const own = second = { ms, tick: null };
     changed();
     try {
       const answer = await room.ask(`/history/${bar.lead.id}/${place}/since/${bar.moment?.tick ?? bar.lead.past.tick}`);
       if (!answer.ok || second !== own) return;
-      const { ms, tick } = await answer.json();
-      Object.assign(own, { ms, tick });
+      const found = await answer.json();
+      Object.assign(own, { ms: isExact ? own.ms : found.ms, tick: found.tick });
       changed();
     } catch {
       act.say("The second cursor was not placed: nobody answers.", true);
@@ -293,12 +300,13 @@ const analyser = (() => {
       const offset = bar.offset(track.signal.driver);
       let i = indexAt(track.times, from + offset + (by > 0 ? 1e-6 : -1e-6)) + (by > 0 ? 1 : 0);
       while (i >= 0 && i < track.times.length && !isEdge(track, i)) i += by;
-      const time = track.times[i] - offset;
-      if (time !== undefined && !Number.isNaN(time) && (best === null || (time - best) * by < 0)) best = time;
+      if (i < 0 || i >= track.times.length) continue;
+      const edge = edgeOf(track, i);
+      if (best === null || (edge.ms - best.ms) * by < 0) best = edge;
     }
     if (best === null) return act.say("There is no further edge in sight: show more time.", true);
     const { begin, end } = view();
-    if (best < begin || best > end) look(best - span / 2, span);
+    if (best.ms < begin || best.ms > end) look(best.ms - span / 2, span);
     put(isSecond, best);
   }
 
@@ -311,7 +319,7 @@ const analyser = (() => {
     isSecond = isOther;
     get("cursor-1").setAttribute("aria-pressed", String(!isSecond));
     get("cursor-2").setAttribute("aria-pressed", String(isSecond));
-    if (isSecond && !second && bar.lead?.past) put(true, first() ?? (view().begin + view().end) / 2);
+    if (isSecond && !second && bar.lead?.past) put(true, { ms: first() ?? (view().begin + view().end) / 2 });
     changed();
   }
 
@@ -333,8 +341,8 @@ const analyser = (() => {
   function stop(driver, ms) {
     const time = ms - bar.offset(driver);
     look(time - span / 2, span);
-    pending = time;
-    bar.show(`at/${time}`, false, driver === bar.lead ? null : { driver, place: `at/${ms}` });
+    pending = { ms: time };
+    bar.show(`at/${time}`, false, driver === bar.lead ? null : { driver, place: `at/${ms}`, ms: time });
   }
 
   // Drawing.

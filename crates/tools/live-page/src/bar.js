@@ -8,6 +8,8 @@ const bar = (() => {
   const canvas = get("bands");
   /** The time between two looks at the outages and faults, in milliseconds. */
   const PERIOD = 1000;
+  /** A time of one driver against another's that changes by so much has jumped, in milliseconds. */
+  const JUMP = 1000;
   let act = {};
   /** The driver whose time the bar shows. */
   let lead = null;
@@ -33,6 +35,17 @@ const bar = (() => {
   /** The place of the shown moment in another driver's time. */
   const placeIn = (driver) => `at/${moment.ms + (offsets.get(driver.id) ?? 0)}`;
 
+  /**
+   * How much later a driver's time is than the lead's, in milliseconds. It stays while both go on: their last ticks, by which
+   * it is measured, come at other times. Of one that stands still it is what it was.
+   */
+  function lag(driver) {
+    const now = driver.past.last - lead.past.last;
+    const jumps = !(Math.abs(now - driver.lag) < JUMP);
+    if (driver.lag === undefined || jumps && driver.past.speed > 0 && lead.past.speed > 0) driver.lag = now;
+    return driver.lag;
+  }
+
   /** Requests a moment of one driver, and shows it. */
   async function fetchOne(driver, place, isStep) {
     const since = driver.moment ? `/since/${driver.moment.tick}` : "";
@@ -44,8 +57,8 @@ const bar = (() => {
   }
 
   /**
-   * Shows a moment of the lead: `at/MS`, `tick/NUMBER` or `after/NUMBER`, and `own` of another driver, `{ driver, place }`:
-   * the lead may have no tick at that time. While one is on its way, the newest one waits.
+   * Shows a moment of the lead: `at/MS`, `tick/NUMBER` or `after/NUMBER`, and `own` of another driver, `{ driver, place, ms }`:
+   * the lead may have no tick at that time, `ms` in its own time. While one is on its way, the newest one waits.
    */
   async function show(place, isStep = false, own = null) {
     if (!lead) return;
@@ -53,7 +66,7 @@ const bar = (() => {
     if (isBusy) return;
     isBusy = true;
     if (!moment) {
-      offsets = new Map(plant.drivers.filter(({ past }) => past).map((driver) => [driver.id, driver.past.last - lead.past.last]));
+      offsets = new Map(plant.drivers.filter(({ past }) => past).map((driver) => [driver.id, lag(driver)]));
     }
     try {
       await showWanted();
@@ -72,7 +85,7 @@ const bar = (() => {
         const first = await fetchOne(lead, place, isStep);
         if (!first || (wanted && wanted.isLive)) break;
         first();
-        moment = { ms: lead.moment.ms, tick: lead.moment.tick };
+        moment = { ms: own?.ms ?? lead.moment.ms, tick: lead.moment.tick };
         const others = plant.drivers.filter((driver) => driver !== lead && driver.past);
         const placeOf = (driver) => (driver === own?.driver ? own.place : placeIn(driver));
         for (const shown of await Promise.all(others.map((driver) => fetchOne(driver, placeOf(driver), isStep)))) shown?.();
@@ -131,7 +144,10 @@ const bar = (() => {
       act.say("");
       // In the lead's time, if the signal is another driver's.
       if (driver === lead) await show(`tick/${found.tick}`, true);
-      else await show(`at/${found.ms - (offsets.get(driver.id) ?? driver.past.last - lead.past.last)}`, true, { driver, place: `tick/${found.tick}` });
+      else {
+        const ms = found.ms - (offsets.get(driver.id) ?? lag(driver));
+        await show(`at/${ms}`, true, { driver, place: `tick/${found.tick}`, ms });
+      }
     } catch {
       act.say("Nobody answers; look at the values when the page is live again.", true);
     }
@@ -228,7 +244,10 @@ const bar = (() => {
     text(get("moment"), moment ? `${words.moment(at)}${isFile ? ` of ${words.moment(last)}` : ""} · tick ${moment.tick.toLocaleString("en")}` : isCut ? `the last ${span} kept` : `${span} recorded`);
     const chosen = act.chosen();
     text(get("goal-signal"), chosen ? `change of ${chosen.name}` : "change of a signal");
-    if (moment && moment.ms < first) act.say("The oldest moments have left the memory; the page shows the oldest that is left.");
+    if (moment && moment.ms < first && !moment.isTold) {
+      moment.isTold = true;
+      act.say("The oldest moments have left the memory; the page shows the oldest that is left.");
+    }
     paint();
   }
 
@@ -276,6 +295,6 @@ const bar = (() => {
     /** The driver whose time the bar shows. */
     get lead() { return lead; },
     /** How much later a driver's time is than the lead's, in milliseconds. */
-    offset: (driver) => (driver === lead || !driver.past ? 0 : moment ? offsets.get(driver.id) ?? 0 : driver.past.last - lead.past.last),
+    offset: (driver) => (driver === lead || !driver.past ? 0 : moment ? offsets.get(driver.id) ?? 0 : lag(driver)),
   };
 })();

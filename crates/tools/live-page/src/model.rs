@@ -4,15 +4,18 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::sync::Mutex;
 
-use tickbus_base::time::Nanos;
+use tickbus_base::time::{Nanos, system_time};
 use tickbus_web::{Differences, Refused};
 
 use crate::exhibit::Exhibit;
 use crate::order::Order;
 
 /// The drivers and runs, and the number of their current state.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct Model {
+    /// The time of day at the beginning, in milliseconds: by it and by the layout, a viewer who comes back knows that the
+    /// drivers are still the same.
+    run: u128,
     number: u64,
     /// The number of joins and leaves, and the number of the state of the last one.
     layout: u64,
@@ -21,6 +24,19 @@ pub(crate) struct Model {
     now: Nanos,
     /// By their ids.
     drivers: BTreeMap<i32, Box<dyn Exhibit>>,
+}
+
+impl Default for Model {
+    fn default() -> Self {
+        Self {
+            run: system_time().as_millis(),
+            number: 0,
+            layout: 0,
+            layout_number: 0,
+            now: Nanos::ZERO,
+            drivers: BTreeMap::new(),
+        }
+    }
 }
 
 impl Model {
@@ -141,7 +157,10 @@ impl Model {
         let seen = seen.filter(|seen| *seen >= self.layout_number);
         let Some(seen) = seen else {
             let (signals, line) = (self.signals(), self.line());
-            let mut json = format!("{{\"layout\":{layout},\"full\":true,\"time_ms\":{time}");
+            let run = self.run;
+            let mut json = format!(
+                "{{\"run\":{run},\"layout\":{layout},\"full\":true,\"time_ms\":{time}"
+            );
             self.write_past(&mut json);
             let _ = write!(json, ",\"signals\":{signals},\"line\":{line}}}");
             return json;

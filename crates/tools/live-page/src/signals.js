@@ -15,6 +15,8 @@ const plant = (() => {
   const STALE = 4;
   /** True while the signals show a moment of the past. */
   let isPast = false;
+  /** The server's run, and the number of its layout: while both are the same, so are the drivers and signals. */
+  let serverRun = null;
   let layout = null;
   let drivers = [];
   let signals = [];
@@ -41,7 +43,7 @@ const plant = (() => {
       isOpen: false,
       trend: null,
     };
-    show(signal, ...live(signal, given.value, given.raw, given.edges, (given.failsafe ? FAIL_SAFE : 0) | (given.forced === null ? 0 : FORCED) | (given.stale ? STALE : 0)));
+    show(signal, ...takeGiven(signal, given));
     return signal;
   }
 
@@ -74,6 +76,18 @@ const plant = (() => {
     signal.isFailSafe = (flags & FAIL_SAFE) !== 0;
     signal.isForced = (flags & FORCED) !== 0;
     signal.isStale = (flags & STALE) !== 0;
+  }
+
+  /** Stores the value of now from the list of all signals. */
+  const takeGiven = (signal, given) => live(signal, given.value, given.raw, given.edges, (given.failsafe ? FAIL_SAFE : 0) | (given.forced === null ? 0 : FORCED) | (given.stale ? STALE : 0));
+
+  /** Takes the values of all signals after another connection with the same run, so that what the page shows stays. */
+  function takeValues(given) {
+    given.drivers.forEach((driver, i) => driver.signals.forEach((it, index) => {
+      const signal = drivers[i].signals[index];
+      const now = takeGiven(signal, it);
+      if (!isPast) show(signal, ...now);
+    }));
   }
 
   /** Replaces the signals: trends that were open stay open. */
@@ -124,10 +138,14 @@ const plant = (() => {
     const event = JSON.parse(text);
     time = event.time_ms;
     heard = performance.now();
-    const isOther = event.full === true;
+    const isFull = event.full === true;
+    const isOther = isFull && (event.run !== serverRun || event.layout !== layout);
     if (isOther) {
+      serverRun = event.run;
       layout = event.layout;
       takeAll(event.signals);
+    } else if (isFull) {
+      takeValues(event.signals);
     } else if (event.layout !== layout) {
       return { isOther: false, isLine: false };
     }

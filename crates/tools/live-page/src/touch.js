@@ -296,6 +296,14 @@ const touch = (() => {
   /** Draws the marks and the words at the parts, where these are now. */
   function show() {
     if (bar.moment && held.size) letGoAll();
+    for (const [path, one] of held) {
+      const isForced = plant.isForcedNow(one.signal);
+      if (one.isSeen && !isForced && !one.isLeft) {
+        held.delete(path);
+        act.say(`${one.signal.name} was let go by another page.`, true);
+      }
+      one.isSeen ||= isForced;
+    }
     for (const sheet of sheets) showOne(sheet);
   }
 

@@ -158,9 +158,8 @@ impl Model {
         let Some(seen) = seen else {
             let (signals, line) = (self.signals(), self.line());
             let run = self.run;
-            let mut json = format!(
-                "{{\"run\":{run},\"layout\":{layout},\"full\":true,\"time_ms\":{time}"
-            );
+            let mut json =
+                format!("{{\"run\":{run},\"layout\":{layout},\"full\":true,\"time_ms\":{time}");
             self.write_past(&mut json);
             let _ = write!(json, ",\"signals\":{signals},\"line\":{line}}}");
             return json;

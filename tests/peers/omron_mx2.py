@@ -10,9 +10,31 @@ import time
 
 from mx2 import MX2
 from mx2.enums import Coil, InverterStatus, MainProfileParameters, ModbusRegisters, MonitoringFunctions
-from mx2.exceptions import MX2Exception
+from mx2.exceptions import MX2Exception, NoResponseException
 
 PATIENCE = 30
+
+
+class Patient:
+    """The driver, whose calls are made again where a busy computer was too late: it has one fixed time for each answer."""
+
+    def __init__(self, drive):
+        self.drive = drive
+
+    def __getattr__(self, name):
+        call = getattr(self.drive, name)
+
+        def patiently(*arguments):
+            for _ in range(5):
+                try:
+                    return call(*arguments)
+                except NoResponseException:
+                    time.sleep(1)
+                    # The late answer is none to the next request.
+                    self.drive._ser.reset_input_buffer()
+            return call(*arguments)
+
+        return patiently
 
 
 def until(what, done):
@@ -27,6 +49,7 @@ def main():
     # It reads what is there after this many milliseconds, and a busy computer answers later than the real inverter.
     drive.latency_time = int(sys.argv[2])
     drive.open()
+    drive = Patient(drive)
 
     def register(which):
         return drive.read_registers(which, 1)[0].value

@@ -5,10 +5,10 @@ mod large;
 mod outage;
 mod past;
 mod touch;
+mod two_drivers;
 
 use std::fs;
 use std::io::{BufRead as _, BufReader};
-use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::time::Instant;
@@ -596,7 +596,7 @@ fn an_open_page_can_force_after_a_restart_that_keeps_its_token() {
 
 #[test]
 fn the_page_fits_every_screen_in_the_light_and_in_the_dark() {
-    let folder = std::env::var_os("TICKBUS_SCREENSHOTS").map(PathBuf::from);
+    let folder = crate::screenshots();
     let machine = Machine::rig();
     let browser = Browser::start(1280, 900);
     for (name, width, height, scheme) in [

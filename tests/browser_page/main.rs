@@ -29,6 +29,11 @@ use std::process::{Child, ChildStdout, Command, Stdio};
 use serde_json::json;
 use webdriver::{Browser, shoot};
 
+/// The folder for screenshots that people look at; `None` unless they ask for them.
+fn screenshots() -> Option<PathBuf> {
+    std::env::var_os("TICKBUS_SCREENSHOTS").map(PathBuf::from)
+}
+
 /// A dispatcher with its page, as a process.
 struct Lab {
     child: Child,
@@ -427,7 +432,7 @@ fn the_page_says_when_it_is_old_and_comes_back() {
 
 #[test]
 fn names_are_shown_and_a_board_with_many_fits_every_screen() {
-    let folder = std::env::var_os("TICKBUS_SCREENSHOTS").map(PathBuf::from);
+    let folder = screenshots();
     let lab = Lab::new();
     let mut tank = lab.join("VP TANK Q04 I03 AQ01");
     let mut board = lab.join("VP SWITCHES Q04 I04");

@@ -1,7 +1,6 @@
 //! The live page of a run on virtual time: it shows clients and variables, and forces none.
 
 use std::io::{BufRead as _, BufReader};
-use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::thread;
 
@@ -113,7 +112,7 @@ impl Participant for Client {
 
 #[test]
 fn a_run_shows_its_clients_and_their_variables_on_every_screen() {
-    let folder = std::env::var_os("TICKBUS_SCREENSHOTS").map(PathBuf::from);
+    let folder = crate::screenshots();
     let run = Run::start();
     let browser = Browser::start(1280, 900);
     for (name, width, height) in [("run-wide", 1280, 720), ("run-phone", 390, 844)] {

@@ -2,28 +2,17 @@
 
 use std::fmt::Write as _;
 use std::fs;
-use std::io::{BufRead as _, BufReader};
-use std::path::PathBuf;
-use std::process::{Child, Command, Stdio};
 
 use serde_json::json;
 
+use crate::commands::Running;
 use crate::webdriver::{Browser, shoot};
-use crate::{assert_fits, assert_quiet, click, find};
+use crate::{assert_fits, assert_quiet, click};
 
 const PICTURE: &str = "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 200 120\">\
     <rect x=\"20\" y=\"10\" width=\"60\" height=\"100\" fill=\"none\" stroke=\"#808080\"/>\
     <rect data-tb-height=\"Level: 0..100\" x=\"22\" y=\"12\" width=\"56\" height=\"96\" fill=\"#3a7ca5\"/>\
     <text data-tb-text=\"Level\" x=\"100\" y=\"60\" fill=\"#808080\">0</text></svg>";
-
-struct Show(Child);
-
-impl Drop for Show {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
 
 /// Ten seconds of a tank, with an outage from second 6 to second 7.
 fn recording() -> String {
@@ -39,25 +28,14 @@ fn recording() -> String {
 
 #[test]
 fn a_recording_opens_at_its_end_and_goes_to_any_moment() {
-    let screenshots = std::env::var_os("TICKBUS_SCREENSHOTS").map(PathBuf::from);
+    let screenshots = crate::screenshots();
     let folder = tempfile::tempdir().expect("a folder");
     fs::write(folder.path().join("run.csv"), recording()).expect("there is room");
     fs::write(folder.path().join("tank.svg"), PICTURE).expect("there is room");
-    let child = Command::new(env!("CARGO_BIN_EXE_tickbus"))
-        .args([
-            "show",
-            "run.csv",
-            "--picture",
-            "tank.svg",
-            "--fault",
-            "Valve",
-        ])
-        .current_dir(folder.path())
-        .stdout(Stdio::piped())
-        .spawn();
-    let mut show = Show(child.expect("the tickbus program runs"));
-    let mut lines = BufReader::new(show.0.stdout.take().expect("it is piped")).lines();
-    let url = find(&mut lines, "show: page at ");
+    let file = |name: &str| folder.path().join(name).display().to_string();
+    let (run, picture) = (file("run.csv"), file("tank.svg"));
+    let mut show = Running::of("show", &[&run, "--picture", &picture, "--fault", "Valve"]);
+    let url = show.after("show: page at ");
     let browser = Browser::start(1280, 800);
     browser.go(&url);
     let moment = |text: &str| {
@@ -71,13 +49,19 @@ fn a_recording_opens_at_its_end_and_goes_to_any_moment() {
          ['pause', 'to-live'].map((id) => document.getElementById(id).hidden), \
          document.querySelector('.driver .reason').textContent.split(';')[0], tickbusPage.value('Level')]",
     );
-    let told = "a recording, run.csv: 1000 ticks in 9990ms, from 10ms to 10s";
+    let told = format!("a recording, {run}: 1000 ticks in 9990ms, from 10ms to 10s");
     assert_eq!(head, json!(["recording", [true, true], told, 0]));
     // The picture follows, tick by tick and from place to place.
-    browser.wait("document.querySelector('#pictures svg text, .picture > div')");
+    let drawn = |level: &str| {
+        browser.wait(&format!(
+            "document.querySelector('.picture > div > div')?.shadowRoot?.querySelector('text').textContent === '{level}'"
+        ));
+    };
+    drawn("0.00");
     click(&browser, "#step-back");
     moment("9.990 s of 10.000 s · tick 999");
     assert_eq!(browser.run("return tickbusPage.value('Level')"), json!(1));
+    drawn("1.00");
     click(&browser, "#step-forth");
     moment("10.000 s of 10.000 s · tick 1,000");
     browser.run("document.getElementById('more-time').open = true");
@@ -96,7 +80,8 @@ fn a_recording_opens_at_its_end_and_goes_to_any_moment() {
     moment("10.000 s of 10.000 s · tick 1,000");
     browser.run("const it = document.getElementById('scrub'); it.value = 6500; it.dispatchEvent(new Event('input'))");
     moment("6.500 s of 10.000 s · tick 650");
-    browser.run("document.querySelectorAll('.row.signal .do button, .row .do button')[1]?.click()");
+    browser.run("list.toggle(plant.signals.find((it) => it.name === 'Level'))");
+    browser.wait("document.querySelector('.row.trend:not([hidden]) canvas')?.getAttribute('aria-label') === 'Trend of Level'");
     shoot(&browser, screenshots.as_deref(), "show", false);
     assert_fits(&browser);
     assert_quiet(&browser);

@@ -160,7 +160,7 @@ fn an_empty_folder_becomes_a_rig_that_a_modbus_plc_meets() {
         browser.run("return document.getElementById('start').disabled"),
         json!(true)
     );
-    let folder = std::env::var_os("TICKBUS_SCREENSHOTS").map(PathBuf::from);
+    let folder = crate::screenshots();
     shoot(&browser, folder.as_deref(), "studio_mistake.png", false);
     fill(&browser, 1, "address", "%IX0.0");
     assert_eq!(
@@ -352,7 +352,7 @@ fn the_studio_fits_a_phone_and_shows_names_as_text() {
     assert_eq!(browser.run("return document.images.length"), json!(0));
     let name = browser.run("return document.querySelector('#rows .c-name').textContent");
     assert_eq!(name, json!("<img src=x onerror=alert(1)>"));
-    let folder = std::env::var_os("TICKBUS_SCREENSHOTS").map(PathBuf::from);
+    let folder = crate::screenshots();
     shoot(&browser, folder.as_deref(), "studio_phone.png", true);
     assert_quiet(&browser);
 }
@@ -432,7 +432,7 @@ fn a_line_is_examined_and_a_found_device_taken_over() {
     ));
     click(&browser, "#find");
     browser.wait("document.querySelector('#devices button') !== null");
-    let folder = std::env::var_os("TICKBUS_SCREENSHOTS").map(PathBuf::from);
+    let folder = crate::screenshots();
     shoot(&browser, folder.as_deref(), "studio_examined.png", false);
     click(&browser, "#devices button");
     browser.wait(&format!(

@@ -145,7 +145,7 @@ fn tags_of_an_asyncua_server_are_dragged_into_the_table_and_their_values_move() 
                   [[signal]]\nname    = \"Lamp\"\naddress = \"%QX2.0\"\n";
     let whole = studio.text();
     assert!(whole.ends_with(wanted), "{whole}");
-    let shots = std::env::var_os("TICKBUS_SCREENSHOTS").map(PathBuf::from);
+    let shots = crate::screenshots();
     shoot(&browser, shots.as_deref(), "studio_tags.png", false);
     click(&browser, "#start");
     wait_line(&browser, "running");
@@ -252,7 +252,7 @@ fn tags_become_signals_by_keys_alone() {
         "signals.length === 2 && signals[1].name === 'Lamp'",
     );
     assert_fits(&browser);
-    let shots = std::env::var_os("TICKBUS_SCREENSHOTS").map(PathBuf::from);
+    let shots = crate::screenshots();
     shoot(&browser, shots.as_deref(), "studio_tags_phone.png", true);
     // A name follows into the place in the device.
     fill(&browser, 0, "name", "Vessel");
@@ -290,7 +290,7 @@ fn a_plc_that_is_not_there_dies_or_refuses_says_what_to_do_and_blocks_nothing() 
     browser.wait("tickbusStudio.file.sheet.fieldbus.security === 'Basic256Sha256'");
     click(&browser, "#browse");
     told(&browser, "is not trusted");
-    let shots = std::env::var_os("TICKBUS_SCREENSHOTS").map(PathBuf::from);
+    let shots = crate::screenshots();
     shoot(&browser, shots.as_deref(), "studio_tags_refused.png", false);
     let pki = studio.folder.path().join("pki");
     for file in std::fs::read_dir(pki.join("rejected")).expect("it is there") {

@@ -1,6 +1,5 @@
 //! The studio beside the live page of a machine that runs.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
@@ -82,7 +81,7 @@ fn the_address_of_a_plc_is_changed_on_the_page_of_a_running_machine() {
     browser.go(&format!("http://{}/#token={}", machine.page, machine.token));
     // The live page has the studio as a tab.
     browser.wait("document.querySelectorAll('#tabs a').length === 2");
-    let folder = std::env::var_os("TICKBUS_SCREENSHOTS").map(PathBuf::from);
+    let folder = crate::screenshots();
     shoot(&browser, folder.as_deref(), "taken_live.png", false);
     click(&browser, "#tabs a:last-child");
     browser.wait(READY);

@@ -30,7 +30,7 @@ class Patient:
                     return call(*arguments)
                 except NoResponseException:
                     time.sleep(1)
-                    # The late answer is none to the next request.
+                    # Else the late answer would be read as that of the next request.
                     self.drive._ser.reset_input_buffer()
             return call(*arguments)
 

@@ -1,10 +1,8 @@
 //! The logic analyser: signals on one time axis, cursors, their distance, zoom, and the trigger.
 
-use std::path::PathBuf;
-
 use serde_json::{Value, json};
 
-use super::{Machine, choose, open, wait_shown};
+use super::{Machine, TANK, choose, open, wait_shown};
 use crate::webdriver::{Browser, shoot};
 use crate::{assert_fits, assert_quiet, middle, wait_said};
 
@@ -12,26 +10,8 @@ const SHIFT: &str = "\u{e008}";
 const LEFT: &str = "\u{e012}";
 const RIGHT: &str = "\u{e014}";
 
-/// A tank whose valve, level and step come back from the outputs.
-const TANK: &str = r#"
-[[signal]]
-name = "Valve command"
-address = "%QX0.0"
-[[signal]]
-name = "Valve"
-address = "%IX0.0"
-[[signal]]
-name = "Set point"
-address = "%QW2"
-type = "INT"
-unit = "mm"
-scale = { raw = [0, 27648], value = [0.0, 500.0] }
-[[signal]]
-name = "Level"
-address = "%IW2"
-type = "INT"
-unit = "mm"
-scale = { raw = [0, 27648], value = [0.0, 500.0] }
+/// A further output, and the input on which it comes back.
+const STEP: &str = r#"
 [[signal]]
 name = "Step wanted"
 address = "%QW4"
@@ -42,14 +22,9 @@ address = "%IW4"
 type = "INT"
 "#;
 
-/// The folder for screenshots, if one is wanted.
-fn shots() -> Option<PathBuf> {
-    std::env::var_os("TICKBUS_SCREENSHOTS").map(PathBuf::from)
-}
-
 /// The machine after some edges of each signal.
 fn worked() -> Machine {
-    let machine = Machine::new("modbus-server", "", TANK);
+    let machine = Machine::new("modbus-server", "", &format!("{TANK}{STEP}"));
     for (valve, level, step) in [("1", "0", "1"), ("0", "13824", "2"), ("1", "27648", "5")] {
         machine.write("0", "0", valve);
         machine.write("4", "1", level);
@@ -70,7 +45,7 @@ fn add(browser: &Browser, name: &str) {
 fn opened(machine: &Machine, width: u32, height: u32) -> Browser {
     let browser = open(machine, width, height);
     wait_shown(&browser, "Level", "500.00mm");
-    for name in ["Valve", "Level", "Step"] {
+    for name in ["Level low", "Level", "Step"] {
         add(&browser, name);
     }
     browser.wait("analyser.tracks[2].values.includes(5) && analyser.tracks[0].values.length > 2");
@@ -185,7 +160,12 @@ fn two_cursors_snap_to_edges_and_tell_the_values_and_the_distance() {
             .ends_with(&distance.replace(',', "")),
         "{told} has {distance}"
     );
-    shoot(&browser, shots().as_deref(), "analyser.png", false);
+    shoot(
+        &browser,
+        crate::screenshots().as_deref(),
+        "analyser.png",
+        false,
+    );
     // The bar's moment is the first cursor, and its steps move it.
     browser.run("document.getElementById('scrub').focus()");
     browser.keys(LEFT);
@@ -194,7 +174,7 @@ fn two_cursors_snap_to_edges_and_tell_the_values_and_the_distance() {
         first.expect("a tick")
     ));
     browser.wait("analyser.tracks[1].parts.now.textContent === '0.00 mm'");
-    // It is dragged, and is a tick in the end.
+    // The cursor follows the pointer, and ends on a tick.
     let (x, y, time) = edge(&browser, 1, 250);
     drag(&browser, "mouse", (x, y), 400);
     browser.wait(&format!("bar.moment.ms > {time}"));
@@ -257,23 +237,47 @@ fn the_axis_is_zoomed_and_moved_by_wheel_fingers_and_keys() {
     assert_quiet(&browser);
 }
 
+/// Arms the trigger.
+fn arm(browser: &Browser, name: &str, case: &str, limit: &str) {
+    browser.run(&format!(
+        "const [signal, kind, limit] = ['trigger-signal', 'trigger-case', 'trigger-limit'].map((id) => document.getElementById(id)); \
+         signal.value = plant.keyOf(plant.signals.find((it) => it.name === '{name}')); \
+         kind.value = '{case}'; kind.dispatchEvent(new Event('change')); limit.value = '{limit}'; \
+         document.getElementById('arm').click()"
+    ));
+}
+
+#[test]
+fn the_trigger_waits_on_after_a_restart_whose_time_begins_again() {
+    let mut machine = worked();
+    let browser = opened(&machine, 1280, 900);
+    // Later than the change of the next run.
+    browser.wait("bar.lead.past.last > 8000");
+    arm(&browser, "Level low", "rises", "");
+    browser.wait("trigger.isArmed");
+    machine.restart();
+    browser.wait("bar.lead?.past?.last < 4000 && bar.lead.past.tick > 0");
+    assert_eq!(browser.run("return trigger.isArmed"), true);
+    machine.write("0", "0", "0");
+    machine.write("0", "0", "1");
+    wait_said(&browser, "Level low rose at ");
+    let fired = browser.run("return bar.moment.ms");
+    assert!(
+        fired.as_f64().is_some_and(|ms| ms < 8000.0),
+        "{fired} is a time of the second run, before the one at which it was armed"
+    );
+}
+
 #[test]
 fn the_trigger_stops_the_view_at_the_tick_of_the_change() {
     let machine = worked();
     let browser = opened(&machine, 1280, 900);
-    let wait_for = |name: &str, case: &str, limit: &str| {
-        browser.run(&format!(
-            "const [signal, kind, limit] = ['trigger-signal', 'trigger-case', 'trigger-limit'].map((id) => document.getElementById(id)); \
-             signal.value = plant.keyOf(plant.signals.find((it) => it.name === '{name}')); \
-             kind.value = '{case}'; kind.dispatchEvent(new Event('change')); limit.value = '{limit}'; \
-             document.getElementById('arm').click()"
-        ));
-    };
+    let wait_for = |name: &str, case: &str, limit: &str| arm(&browser, name, case, limit);
     wait_for("Level", "above", "much");
     wait_said(&browser, "\"much\" is not a number");
     wait_for("Level", "above", "100");
     browser.wait("trigger.isArmed");
-    // It is above already, and comes from below later.
+    // The signal is above the limit already, so the trigger waits until it has been below.
     machine.write("4", "1", "0");
     machine.write("4", "1", "2765");
     assert_eq!(browser.run("return trigger.isArmed"), true);
@@ -292,11 +296,12 @@ fn the_trigger_stops_the_view_at_the_tick_of_the_change() {
         tick.expect("a tick") - 1
     ));
     assert_eq!(browser.run("return tickbusPage.value('Level') < 100"), true);
-    wait_for("Valve", "falls", "");
+    wait_for("Level low", "falls", "");
     browser.wait("trigger.isArmed && !bar.moment");
     machine.write("0", "0", "0");
-    wait_said(&browser, "Valve fell at ");
-    browser.wait("bar.moment && !plant.number(plant.signals.find((it) => it.name === 'Valve'))");
+    wait_said(&browser, "Level low fell at ");
+    browser
+        .wait("bar.moment && !plant.number(plant.signals.find((it) => it.name === 'Level low'))");
     assert_quiet(&browser);
 }
 
@@ -326,7 +331,7 @@ fn a_signal_is_dropped_and_leaves_and_the_axis_fits_a_phone_in_the_dark() {
     browser.wait("plant.signals.length > 0");
     browser.run("document.getElementById('list').scrollIntoView()");
     wait_shown(&browser, "Level", "500.00mm");
-    for name in ["Valve", "Level", "Step"] {
+    for name in ["Level low", "Level", "Step"] {
         browser.run(&format!(
             "list.select(plant.signals.find((it) => it.name === '{name}')); document.getElementById('analyse').click()"
         ));
@@ -335,7 +340,12 @@ fn a_signal_is_dropped_and_leaves_and_the_axis_fits_a_phone_in_the_dark() {
     browser.wait("analyser.tracks.every(({ values }) => values.length > 2)");
     browser.run("scrollTo(0, 0)");
     assert_fits(&browser);
-    shoot(&browser, shots().as_deref(), "analyser_phone.png", false);
+    shoot(
+        &browser,
+        crate::screenshots().as_deref(),
+        "analyser_phone.png",
+        false,
+    );
     let small = browser.run(
         "return Array.from(document.querySelectorAll('#analyser button, #analyser select')).filter((it) => it.offsetParent) \
          .filter((it) => !it.getAttribute('aria-label') && !it.textContent.trim() && !it.closest('label')).length",

@@ -2,7 +2,6 @@
 
 use std::io::{BufRead as _, BufReader};
 use std::net::TcpListener;
-use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 
@@ -13,11 +12,6 @@ use crate::webdriver::{Browser, shoot};
 use crate::{assert_fits, assert_quiet, find};
 
 const TOLD: &str = "document.querySelector('.told').textContent";
-
-/// Where screenshots go, if anywhere.
-fn shots() -> Option<PathBuf> {
-    std::env::var_os("TICKBUS_SCREENSHOTS").map(PathBuf::from)
-}
 
 /// The looks of the boxes, from the PLC to the machine.
 fn looks(browser: &Browser) -> String {
@@ -59,12 +53,22 @@ fn a_plc_that_dies_and_comes_back_is_marked_told_once_and_listed() {
             .expect("a truth")
     );
     assert_eq!(looks(&browser), "bad unknown good good");
-    shoot(&browser, shots().as_deref(), "outage-never.png", false);
+    shoot(
+        &browser,
+        crate::screenshots().as_deref(),
+        "outage-never.png",
+        false,
+    );
     let mut plc = machine.plc();
     browser.wait("document.querySelector('.told').hidden");
     browser.wait("document.querySelectorAll('.way .good').length === 4");
-    shoot(&browser, shots().as_deref(), "outage-healthy.png", false);
-    // What is read aloud changes once.
+    shoot(
+        &browser,
+        crate::screenshots().as_deref(),
+        "outage-healthy.png",
+        false,
+    );
+    // A screen reader gets the sentence once, not at each attempt.
     browser.run(
         "window.told = []; new MutationObserver(() => window.told.push(document.querySelector('.told').textContent)) \
          .observe(document.querySelector('.told'), { childList: true, characterData: true, subtree: true })",
@@ -76,18 +80,28 @@ fn a_plc_that_dies_and_comes_back_is_marked_told_once_and_listed() {
     browser.run("await new Promise((go) => setTimeout(go, 2500))");
     let told = browser.run("return window.told.length");
     assert!(told.as_u64().is_some_and(|told| told <= 3), "{told}");
-    shoot(&browser, shots().as_deref(), "outage-broken.png", false);
+    shoot(
+        &browser,
+        crate::screenshots().as_deref(),
+        "outage-broken.png",
+        false,
+    );
     let dark = json!({"features": [{"name": "prefers-color-scheme", "value": "dark"}]});
     browser.devtools("Emulation.setEmulatedMedia", &dark);
     browser.run("document.querySelector('.told').scrollIntoView({ behavior: 'instant' })");
-    shoot(&browser, shots().as_deref(), "outage-dark.png", false);
+    shoot(
+        &browser,
+        crate::screenshots().as_deref(),
+        "outage-dark.png",
+        false,
+    );
     let _plc = machine.plc();
     browser.wait("document.querySelectorAll('.way .good').length === 4");
     let names = events(&browser);
     assert_eq!(names[0], "connected", "{names:?}");
     assert!(names[1..].contains(&"connected".to_owned()), "{names:?}");
     assert!(names.len() <= 10);
-    // What is forced is none of the line's events, and leaves those of an outage.
+    // A force does not push the events of the outage out of the list.
     force(&browser, "Start button", "TRUE");
     browser.wait("!document.getElementById('forced').hidden");
     browser.run("document.getElementById('release-all').click()");
@@ -134,12 +148,17 @@ fn a_plc_that_does_not_answer_is_tried_again_with_a_countdown() {
     let nothing = json!(format!("Nothing answers at {bus}, since "));
     browser.wait(&format!("{TOLD}.startsWith({nothing})"));
     assert_eq!(looks(&browser), "bad unknown good good");
-    // It counts down, and the attempts that failed are one event.
+    // The page counts down to the next attempt, and joins the failed attempts into one event.
     let next = "document.querySelector('.next')";
     browser.wait(&format!("/^Next try in 2 s$/.test({next}.textContent)"));
     browser.wait(&format!("/^Next try in 1 s$/.test({next}.textContent)"));
     browser.wait("[...document.querySelectorAll('.events strong')].some((it) => /^\\d tries failed$/.test(it.textContent))");
     assert_fits(&browser);
-    shoot(&browser, shots().as_deref(), "outage-phone.png", false);
+    shoot(
+        &browser,
+        crate::screenshots().as_deref(),
+        "outage-phone.png",
+        false,
+    );
     assert_quiet(&browser);
 }

@@ -2,7 +2,6 @@
 
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
-use std::path::PathBuf;
 use std::thread;
 use std::time::Duration;
 
@@ -73,7 +72,7 @@ const DOWN_UP: [&str; 2] = ["pointerDown", "pointerUp"];
 
 #[test]
 fn a_part_tells_its_signal_is_found_in_the_list_and_opens_its_trend() {
-    let folder = std::env::var_os("TICKBUS_SCREENSHOTS").map(PathBuf::from);
+    let folder = crate::screenshots();
     let (_machine, browser) = touched();
     let tip = "document.querySelector('.picture .tip:not([hidden])')?.textContent";
     point(&browser, "mouse", "level", &[]);
@@ -127,9 +126,8 @@ fn a_part_tells_its_signal_is_found_in_the_list_and_opens_its_trend() {
     browser.wait("document.activeElement.id === 'force-value'");
     browser.keys(&format!("100{ENTER}"));
     wait_said(&browser, "Level is forced to 100 mm.");
-    browser.wait(&format!(
-        "{tip}?.startsWith('Level: 100.00 mm, forced') || document.activeElement.id === 'force-value'"
-    ));
+    point(&browser, "mouse", "level", &[]);
+    browser.wait(&format!("{tip}?.startsWith('Level: 100.00 mm, forced')"));
     assert_quiet(&browser);
 }
 
@@ -169,7 +167,7 @@ fn a_push_button_is_held_as_long_as_pointer_or_key() {
         key(&browser, "keyUp", name);
         is_on(false);
     }
-    // Whatever ends the hold lets go.
+    // Each of these ends the hold, and the button is let go.
     for end in [
         "document.querySelector('.picture > div > div').shadowRoot.activeElement.blur()",
         "window.dispatchEvent(new Event('blur'))",
@@ -198,6 +196,38 @@ fn a_push_button_is_held_as_long_as_pointer_or_key() {
     browser.wait(&format!("{}.ariaChecked === 'true'", part("turn")));
     point(&browser, "mouse", "turn", &DOWN_UP);
     is_on(false);
+}
+
+#[test]
+fn quick_presses_and_another_page_leave_no_button_pressed() {
+    let (machine, browser) = touched();
+    let is_held = "document.querySelector('.picture .marks .pressed:not([hidden])')";
+    let is_forced = "plant.isForcedNow(plant.signals[1])";
+    // The second press begins while the first one is being let go, and lasts.
+    for _ in 0..5 {
+        point(
+            &browser,
+            "mouse",
+            "start",
+            &["pointerDown", "pointerUp", "pointerDown"],
+        );
+        browser.run("await new Promise((go) => setTimeout(go, 600))");
+        browser.wait(&format!("{is_held} && {is_forced}"));
+        assert_eq!(machine.read("1", "0"), 1, "the PLC sees it");
+        browser.act(&json!([{"type": "pointer", "id": "mouse", "actions": [{"type": "pointerUp", "button": 0}]}]));
+        browser.wait(&format!("!{is_held} && !{is_forced}"));
+        assert_eq!(machine.read("1", "0"), 0, "the PLC sees it");
+    }
+    // Another page releases the signal while this one holds the button.
+    point(&browser, "mouse", "start", &["pointerDown"]);
+    wait_said(&browser, "Level low is pressed.");
+    browser.wait(is_forced);
+    browser.run("await room.change('DELETE', '/force/7/Level%20low')");
+    wait_said(&browser, "Level low was let go by another page.");
+    browser.wait(&format!("!{is_held}"));
+    browser.act(&json!([{"type": "pointer", "id": "mouse", "actions": [{"type": "pointerUp", "button": 0}]}]));
+    browser.wait(&format!("!{is_forced}"));
+    assert_quiet(&browser);
 }
 
 #[test]
@@ -233,7 +263,7 @@ fn without_the_token_a_button_says_why_it_is_not_pressed() {
 
 #[test]
 fn the_buttons_in_the_drawing_of_a_training_machine_work() {
-    let folder = std::env::var_os("TICKBUS_SCREENSHOTS").map(PathBuf::from);
+    let folder = crate::screenshots();
     let temporary = tempfile::tempdir().expect("a folder");
     let config = include_str!("../../../examples/machines/two-tanks/driver.cfg")
         .replacen(

@@ -251,7 +251,7 @@ impl Shared {
         ends.bus_facts.set(&config);
         open.other_end = other_end;
         let mut port = ends.equipped(port.for_next_bus(watchdog), &config);
-        ends.status.has_other_settings(ends.clock.now());
+        ends.status.note_other_settings(ends.clock.now());
         port.opening("the line has other settings");
         match ends.start(&config, bus, port) {
             Ok(thread) => {

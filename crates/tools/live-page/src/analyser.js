@@ -3,6 +3,7 @@
 // The logic analyser: signals on one time axis, with two cursors, from the server's history.
 
 const analyser = (() => {
+  const { make, write } = elements;
   const get = (id) => document.getElementById(id);
   const [ROW, AXIS] = [52, 24];
   /** The most signals. */
@@ -17,6 +18,8 @@ const analyser = (() => {
   const MOST = 60000;
   /** An integer with more values than this is a curve. */
   const STATES = 16;
+  /** A nanosecond, in milliseconds: times of two drivers are converted into each other, and rounded. */
+  const TINY = 1e-6;
   const KIND = "application/x-tickbus-signal";
   const plot = get("plot");
   const canvas = get("waves");
@@ -32,7 +35,6 @@ const analyser = (() => {
   let pending = null;
   let shownMoment = null;
   let isSecond = false;
-  let isAsking = false;
   let hasNews = false;
   let asked = 0;
   const pointers = new Map();
@@ -128,15 +130,6 @@ const analyser = (() => {
     else get("list").focus({ preventScroll: true });
   }
 
-  function make(tag, name, parent, text = "") {
-    const it = document.createElement(tag);
-    it.className = name;
-    it.textContent = text;
-    if (tag === "button") it.type = "button";
-    parent.append(it);
-    return it;
-  }
-
   function build() {
     get("analyser").hidden = !tracks.length;
     get("analyser").classList.toggle("is-empty", !tracks.length);
@@ -175,16 +168,9 @@ const analyser = (() => {
 
   // What the server knows.
 
-  async function collect() {
-    if (isAsking || document.hidden || !tracks.length || !bar.lead?.past) return;
-    isAsking = true;
-    try {
-      await Promise.all(plant.drivers.map(collectOf));
-    } catch {
-      // The page says if the server does not answer; the next request follows.
-    }
-    isAsking = false;
-  }
+  const collect = room.every(PERIOD, async () => {
+    if (!document.hidden && tracks.length && bar.lead?.past) await Promise.all(plant.drivers.map(collectOf));
+  });
 
   async function collectOf(driver) {
     const { past } = driver;
@@ -211,15 +197,7 @@ const analyser = (() => {
     for (const track of group) {
       const given = news.signals[track.signal.index];
       if (from < track.from || from > track.until || track.isThin && to - from > span * 1.5) Object.assign(track, { times: [], values: [], from, isThin: false });
-      let known = track.times.length;
-      while (known && track.times[known - 1] > from) known -= 1;
-      track.times.length = track.values.length = known;
-      given.ms.forEach((time, i) => {
-        const value = given.values[i] ?? NaN;
-        if (track.times.length && Object.is(value, track.values.at(-1))) return;
-        track.times.push(time);
-        track.values.push(value);
-      });
+      trend.merge(track, given, from);
       if (track.times.length > MOST) {
         track.times.splice(0, MOST / 4);
         track.values.splice(0, MOST / 4);
@@ -298,7 +276,7 @@ const analyser = (() => {
     let best = null;
     for (const track of own.length ? own : tracks) {
       const offset = bar.offset(track.signal.driver);
-      let i = indexAt(track.times, from + offset + (by > 0 ? 1e-6 : -1e-6)) + (by > 0 ? 1 : 0);
+      let i = indexAt(track.times, from + offset + (by > 0 ? TINY : -TINY)) + (by > 0 ? 1 : 0);
       while (i >= 0 && i < track.times.length && !isEdge(track, i)) i += by;
       if (i < 0 || i >= track.times.length) continue;
       const edge = edgeOf(track, i);
@@ -358,10 +336,6 @@ const analyser = (() => {
   }
 
   const isStates = (track) => track.states ?? (track.isFew && !track.signal.unit && !/REAL|TIME|BOOL/.test(track.signal.type));
-
-  function text(element, value) {
-    if (element.textContent !== value) element.textContent = value;
-  }
 
   function valueText(track, value) {
     const shown = words.value({ ...track.signal, value: Number.isNaN(value) ? null : value });
@@ -456,7 +430,7 @@ const analyser = (() => {
 
   /** The value at a time, as far as it is known. */
   function valueAt({ signal, times, values, from, until }, ms) {
-    const time = ms + bar.offset(signal.driver);
+    const time = ms + bar.offset(signal.driver) + TINY;
     return time < from || time > until ? undefined : valueOf({ values }, indexAt(times, time));
   }
 
@@ -466,9 +440,9 @@ const analyser = (() => {
     for (const track of tracks) {
       const { signal, parts } = track;
       const known = one === null ? undefined : valueAt(track, one);
-      text(parts.now, known === undefined ? words.value(signal) + (signal.unit && signal.value !== null ? ` ${signal.unit}` : "") : valueText(track, known));
+      write(parts.now, known === undefined ? words.value(signal) + (signal.unit && signal.value !== null ? ` ${signal.unit}` : "") : valueText(track, known));
       const other = second ? valueAt(track, second.ms) : undefined;
-      text(parts.then, second ? (other === undefined ? "–" : valueText(track, other)) : "");
+      write(parts.then, second ? (other === undefined ? "–" : valueText(track, other)) : "");
       if (parts.states) {
         const label = `Show ${signal.name} as ${isStates(track) ? "a curve" : "states"}`;
         if (parts.states.title !== label) {
@@ -488,7 +462,7 @@ const analyser = (() => {
       const ticks = tick === null || second.tick === null ? "…" : words.count(second.tick - tick, "tick", "ticks").replace("-", "−");
       told.push(`distance ${ticks}, ${ms} ms`);
     }
-    text(get("reading"), told.join(" · ") || "A click places the cursor.");
+    write(get("reading"), told.join(" · ") || "A click places the cursor.");
     get("follow").hidden = held === null;
     get("drop-cursor").hidden = !second;
   }
@@ -622,7 +596,6 @@ const analyser = (() => {
   });
 
   new ResizeObserver(() => { if (tracks.length) changed(); }).observe(plot);
-  setInterval(collect, PERIOD);
   return {
     add, renew, redraw, moved, stop, follow, zoom, pan, all, toEdge,
     isMoving: () => tracks.length > 0 && held === null,

@@ -102,6 +102,14 @@ pub(crate) fn millis(time: Nanos) -> f64 {
     time.0 as f64 / 1e6
 }
 
+/// Adds an item, and drops the oldest one if there are too many.
+fn push<T>(list: &mut VecDeque<T>, item: T) {
+    if list.len() == MOST {
+        list.pop_front();
+    }
+    list.push_back(item);
+}
+
 impl Archive {
     pub(crate) fn new(history: Arc<History>, facts: Facts) -> Self {
         let signals = facts.table.signals.iter();
@@ -190,10 +198,7 @@ impl Archive {
                 ..mark.clone()
             });
             for mark in begin.into_iter().chain([mark]) {
-                if marks.len() == MOST {
-                    marks.pop_front();
-                }
-                marks.push_back(mark);
+                push(marks, mark);
             }
         }
         if seen.len() > MOST {
@@ -203,18 +208,15 @@ impl Archive {
 
     /// Notes that a recorded signal which tells of a fault has gone on, or off, at a tick.
     pub(crate) fn note_turn(&self, (tick, at): (u64, Nanos), name: &str, begins: bool) {
-        let marks = &mut self.notes().marks;
-        if marks.len() == MOST {
-            marks.pop_front();
-        }
-        marks.push_back(Mark {
+        let mark = Mark {
             tick,
             at: Some(at),
             force: None,
             name: name.to_owned(),
             text: name.to_owned(),
             begins,
-        });
+        };
+        push(&mut self.notes().marks, mark);
     }
 
     /// The rows of the last tick.
@@ -237,16 +239,14 @@ impl Archive {
         if is_same {
             return;
         }
-        if lines.len() == MOST {
-            lines.pop_front();
-        }
         let least = lines.back().map_or(Nanos(i64::MIN), |last| last.at);
-        lines.push_back(LineNote {
+        let line = LineNote {
             at: (span.last.1 - (now - link.since).max(Nanos::ZERO)).max(least),
             state: link.state,
             cause,
             reason: link.reason.clone(),
-        });
+        };
+        push(lines, line);
     }
 
     /// How far it reaches, for every event.
@@ -436,7 +436,7 @@ impl Archive {
                 change
             })
             .collect();
-        let line = self.line_at(tick.time);
+        let line = self.line_at((tick.number, tick.time));
         let texts: Vec<_> = faults.iter().map(|mark| &mark.text).collect();
         let head = json!({
             "tick": tick.number, "ms": millis(tick.time), "status": tick.status, "stations": tick.stations,

@@ -3,6 +3,7 @@
 // The bar of time: pauses the page, and shows any moment of the histories of the drivers, while the present goes on.
 
 const bar = (() => {
+  const { write } = elements;
   const get = (id) => document.getElementById(id);
   const range = get("scrub");
   const canvas = get("bands");
@@ -29,7 +30,6 @@ const bar = (() => {
 
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { colours = null; });
 
-  const isRecording = ({ kind }) => kind === "recording";
   const path = (driver, rest) => `/history/${driver.id}/${rest}`;
 
   /** The place of the shown moment in another driver's time. */
@@ -104,7 +104,7 @@ const bar = (() => {
   /** Returns to the present. */
   function live() {
     // A recording has no present; its end is the newest moment.
-    if (lead && isRecording(lead)) return show(`at/${lead.past.last}`);
+    if (lead?.isRecording) return show(`at/${lead.past.last}`);
     wanted = isBusy ? { isLive: true } : null;
     if (!isBusy) leave();
   }
@@ -208,10 +208,6 @@ const bar = (() => {
     for (const { ms, begins } of overview.marks) if (begins && ms >= first) ctx.fillRect(x(ms) - 1, 0, 2, height);
   }
 
-  function text(element, value) {
-    if (element.textContent !== value) element.textContent = value;
-  }
-
   /** Shows the state of the bar. */
   function redraw() {
     if (!plant.drivers.includes(lead)) {
@@ -225,7 +221,7 @@ const bar = (() => {
     }
     lead ??= plant.drivers.find(({ past }) => past) ?? null;
     get("bar").hidden = !lead?.past;
-    const isFile = Boolean(lead?.past) && isRecording(lead);
+    const isFile = Boolean(lead?.past && lead.isRecording);
     if (isFile && !moment && !isBusy) show(`at/${lead.past.last}`);
     document.body.classList.toggle("is-past", Boolean(moment) && !isFile);
     if (!lead?.past) return;
@@ -240,10 +236,10 @@ const bar = (() => {
     range.setAttribute("aria-valuetext", moment ? `${words.moment(at)}, tick ${moment.tick}${isFile ? "" : `, ${words.span(ago)} ago`}` : "live");
     get("pause").hidden = Boolean(moment) || isFile;
     get("to-live").hidden = !moment || isFile;
-    if (moment) text(get("to-live"), `Live: +${words.span(ago)}`);
-    text(get("moment"), moment ? `${words.moment(at)}${isFile ? ` of ${words.moment(last)}` : ""} · tick ${moment.tick.toLocaleString("en")}` : isCut ? `the last ${span} kept` : `${span} recorded`);
+    if (moment) write(get("to-live"), `Live: +${words.span(ago)}`);
+    write(get("moment"), moment ? `${words.moment(at)}${isFile ? ` of ${words.moment(last)}` : ""} · tick ${moment.tick.toLocaleString("en")}` : isCut ? `the last ${span} kept` : `${span} recorded`);
     const chosen = act.chosen();
-    text(get("goal-signal"), chosen ? `change of ${chosen.name}` : "change of a signal");
+    write(get("goal-signal"), chosen ? `change of ${chosen.name}` : "change of a signal");
     if (moment && moment.ms < first && !moment.isTold) {
       moment.isTold = true;
       act.say("The oldest moments have left the memory; the page shows the oldest that is left.");

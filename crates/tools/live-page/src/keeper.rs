@@ -257,6 +257,7 @@ mod tests {
     use super::*;
     use crate::sheet::Sheet;
     use std::sync::atomic::{AtomicUsize, Ordering};
+    use std::time::Duration;
     use tickbus_base::statistics::Statistics;
     use tickbus_base::time::Monotonic;
     use tickbus_fieldbus::LinkState;
@@ -348,7 +349,7 @@ mod tests {
         };
         let keeper = Keeper {
             inbox: Arc::default(),
-            model: Arc::default(),
+            model: Arc::new(Shared::opened(Duration::ZERO)),
             heard: clock.now(),
             holders: 0,
             clock,

@@ -4,8 +4,8 @@
 //! page's thread requests copies of the ticks, and compares them with the known state: a viewer gets only the changes
 //! since the last look. Another thread answers requests about the past, from the history that the driver's recorder
 //! feeds. Signals are forced by faults of the kind "stuck". The server of a run on virtual time joins by
-//! its [`Controls`](tickbus_virtual_time::Controls), and is only shown; so is a [`Recorded`] file. docs/live-page.md describes the page, for users
-//! and for programs.
+//! its [`Controls`](tickbus_virtual_time::Controls), and is only shown; so is a [`Recorded`] file. docs/live-page.md
+//! describes the page, for users and for programs.
 
 mod archive;
 mod assets;

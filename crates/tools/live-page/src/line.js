@@ -3,22 +3,11 @@
 // The line of each driver: its state in the words of the log, its stations, faults, times and counters.
 
 const line = (() => {
+  const { make, write } = elements;
   const box = document.getElementById("drivers");
   let cards = new Map();
   /** Requests a change: `(method, path, body, done)`. */
   let change = () => {};
-
-  function make(tag, className, parent, content) {
-    const it = document.createElement(tag);
-    if (className) it.className = className;
-    if (content !== undefined) it.textContent = content;
-    parent.append(it);
-    return it;
-  }
-
-  function say(element, text) {
-    if (element.textContent !== text) element.textContent = text;
-  }
 
   /** The colour of a state. */
   const colour = { running: "good", stale: "stale", failed: "bad", opening: "stale", closed: "gap" };
@@ -31,7 +20,7 @@ const line = (() => {
     make("span", "note", head, `${driver.kind}, ${driver.role}`);
     const reason = make("p", "reason", it);
     // Beside the picture, which says it without chatter, only a run's reason is read aloud.
-    if (driver.kind === "sync") reason.setAttribute("role", "status");
+    if (driver.isRun) reason.setAttribute("role", "status");
     const since = make("p", "note since", it);
     const way = outage.card(driver, it);
     const faults = make("ul", "faults", it);
@@ -98,7 +87,7 @@ const line = (() => {
         });
       }
     }
-    rows.forEach((cells, i) => cells.forEach((cell, j) => say(table.tBodies[0].rows[i].cells[j], cell)));
+    rows.forEach((cells, i) => cells.forEach((cell, j) => write(table.tBodies[0].rows[i].cells[j], cell)));
   }
 
   const figures = (number) => (Number.isInteger(number) ? number.toLocaleString("en") : String(number));
@@ -111,7 +100,7 @@ const line = (() => {
     if (age >= 0) shown.push(["Age of data", words.span(age), line.stations.some(({ stale }) => stale) ? "warn" : "good"]);
     if (times.exchange?.count) shown.push(["Exchange, p50", words.fine(times.exchange.p50_us), ""]);
     if (times.bus_cycle?.count) shown.push(["Bus cycle, p50", words.fine(times.bus_cycle.p50_us), ""]);
-    if (line.tick) shown.push(["Ticks", figures(line.tick), isSilent(line) ? "bad" : ""]);
+    if (line.tick) shown.push(["Ticks", figures(line.tick), plant.isSilent(line) ? "bad" : ""]);
     if (card.facts.children.length !== shown.length) {
       card.facts.replaceChildren();
       for (const [title] of shown) {
@@ -122,8 +111,8 @@ const line = (() => {
     }
     shown.forEach(([title, value, look], i) => {
       const it = card.facts.children[i];
-      say(it.children[0], title);
-      say(it.children[1], value);
+      write(it.children[0], title);
+      write(it.children[1], value);
       it.className = look;
     });
   }
@@ -141,9 +130,6 @@ const line = (() => {
     }
   }
 
-  /** True if the simulation stands still. */
-  const isSilent = (line) => line.silence_ms > 1000;
-
   /** Milliseconds since the line was last heard of, for figures that count on between messages. */
   const since = (line) => line.since_ms + (line.isPast ? 0 : performance.now() - line.heard);
 
@@ -159,19 +145,19 @@ const line = (() => {
       // A line can run with stale data while the PLC is in STOP.
       const isStale = line.status === "stale" && line.state === "running";
       const state = isStale ? "stale" : line.state;
-      say(own.name, driver.name);
-      say(own.state, state);
+      write(own.name, driver.name);
+      write(own.state, state);
       own.state.className = `tag ${colour[state] ?? ""}`;
       own.it.classList.toggle("trouble", state !== "running");
-      say(own.reason, line.reason || "no reason known");
-      say(own.since, `${line.since_ms === undefined ? "" : `for ${words.span(since(line))}, `}cause ${line.cause}, data ${line.status}${isSilent(line) ? `; the simulation has not ticked for ${words.span(line.silence_ms)}` : ""}`);
+      write(own.reason, line.reason || "no reason known");
+      write(own.since, `${line.since_ms === undefined ? "" : `for ${words.span(since(line))}, `}cause ${line.cause}, data ${line.status}${plant.isSilent(line) ? `; the simulation has not ticked for ${words.span(line.silence_ms)}` : ""}`);
       outage.show(own.way, line, driver);
-      if (driver.kind === "recording") say(own.since, `data ${line.status}`);
+      if (driver.isRecording) write(own.since, `data ${line.status}`);
       // A forced value that was released is no longer worth a row.
       faults(own, (line.faults ?? []).filter(({ name, phase }) => phase !== "over" || !name.startsWith("forced: ")));
       showModelFaults(own, line.model_faults ?? []);
       facts(own, line);
-      const isRun = driver.kind === "sync";
+      const { isRun } = driver;
       const several = line.stations.length > 1 || isRun ? line.stations : [];
       if (isRun) fill(own.stations, ["Client", "State", "Reason"], several.map((it) => [it.name, it.state, it.reason]));
       else fill(own.stations, ["Station", "State", "Age", "Reason"], several.map((it) => [it.name, it.stale ? "stale" : it.state, words.span(it.age_ms), it.reason ?? ""]));

@@ -240,7 +240,7 @@ fn end_of(watch: &Watch) -> Option<&'static str> {
     if bus.complaints().is_some() {
         return Some("server");
     }
-    bus.kind().ends_with("-client").then_some("client")
+    bus.is_client().then_some("client")
 }
 
 /// Sorts statistics into counters, distributions and texts.

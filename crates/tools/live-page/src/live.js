@@ -3,6 +3,7 @@
 // The page's controller: receives events, shows them, and requests forced values.
 
 (() => {
+  const { write } = elements;
   const get = (id) => document.getElementById(id);
   const forceValue = get("force-value");
   let mayForce = false;
@@ -17,11 +18,7 @@
   }
 
   /** True if the page shows a file, and nothing runs. */
-  const isRecording = () => plant.drivers.some(({ kind }) => kind === "recording");
-
-  function show(element, text) {
-    if (element.textContent !== text) element.textContent = text;
-  }
+  const isRecording = () => plant.drivers.some((driver) => driver.isRecording);
 
   // Forcing.
 
@@ -60,7 +57,7 @@
     } else if (!mayForce) {
       say("Read-only: open the address that was printed, with its token, to force a signal.", true);
     } else if (!signal.isWritable) {
-      const why = signal.driver.kind === "sync" ? "that would change the run" : "the program only observes this bus";
+      const why = signal.driver.isRun ? "that would change the run" : "the program only observes this bus";
       say(`${signal.name} cannot be forced: ${why}.`, true);
     } else {
       return !isPast();
@@ -87,18 +84,18 @@
     if (!signal) return;
     const isNew = get("chosen").dataset.key !== plant.keyOf(signal);
     get("chosen").dataset.key = plant.keyOf(signal);
-    show(get("chosen-name"), signal.name);
+    write(get("chosen-name"), signal.name);
     const ways = { I: "to the PLC", Q: "from the PLC" };
     const facts = [signal.address, signal.type, ways[signal.direction] ?? `written by ${signal.driver.stations[signal.station]}`].filter(Boolean);
     if (signal.latch) facts.push(`latch ${signal.latch}`);
     if (signal.reply) facts.push(`reply: ${signal.reply}`);
     if (plant.drivers.length > 1) facts.push(signal.driver.name);
-    show(get("chosen-facts"), facts.join(" · "));
+    write(get("chosen-facts"), facts.join(" · "));
     get("chosen-tools").hidden = !mayForce || !signal.isWritable;
     get("force-bool").hidden = !signal.isBool;
     get("force-number").hidden = signal.isBool;
-    show(get("force-unit"), signal.unit);
-    show(get("trend"), signal.isOpen ? "Close trend" : "Trend");
+    write(get("force-unit"), signal.unit);
+    write(get("trend"), signal.isOpen ? "Close trend" : "Trend");
     if (isNew) {
       // To the last digit: confirming it unchanged holds the current value.
       forceValue.value = signal.value === null || signal.isBool ? "" : String(signal.value);
@@ -232,13 +229,13 @@
     get("forced").hidden = now.forced === 0;
     get("release-all").hidden = !mayForce;
     const further = now.forced > names.length ? ` and ${now.forced - names.length} more` : "";
-    show(get("forced-text"), `${words.count(now.forced, "signal is", "signals are")} forced: ${names.join(", ")}${further}`);
+    write(get("forced-text"), `${words.count(now.forced, "signal is", "signals are")} forced: ${names.join(", ")}${further}`);
     const down = plant.drivers.filter(({ line }) => line && (line.status === "stale" || line.state !== "running"));
     const told = down.map((driver) => (plant.drivers.length > 1 ? `${driver.name}: ${driver.line.reason}` : driver.line.reason));
     const safe = now.failSafe ? `${words.count(now.failSafe, "signal has its", "signals have their")} fail-safe ${now.failSafe === 1 ? "value" : "values"}` : "";
     get("failsafe").hidden = told.length === 0 && !safe;
     get("show-failsafe").hidden = now.failSafe === 0;
-    show(get("failsafe-text"), [safe, told.join("; ")].filter(Boolean).join(": "));
+    write(get("failsafe-text"), [safe, told.join("; ")].filter(Boolean).join(": "));
     const isOther = now.forced !== counts.forced || now.failSafe !== counts.failSafe;
     counts = now;
     if (isOther && (list.kind === "forced" || list.kind === "failsafe")) list.choose();
@@ -246,11 +243,11 @@
 
   function renew() {
     const names = plant.drivers.map(({ name }) => name);
-    show(get("title"), names.join(" · ") || "tickbus");
+    write(get("title"), names.join(" · ") || "tickbus");
     document.title = `${names.join(" · ") || "No driver"} – tickbus`;
-    show(get("counts"), plant.drivers.length > 1 ? `${plant.drivers.length} drivers` : "");
+    write(get("counts"), plant.drivers.length > 1 ? `${plant.drivers.length} drivers` : "");
     // The variables of a run have no address and no direction, and cannot be forced.
-    document.body.classList.toggle("only-runs", plant.drivers.length > 0 && plant.drivers.every(({ kind }) => kind === "sync"));
+    document.body.classList.toggle("only-runs", plant.drivers.length > 0 && plant.drivers.every((driver) => driver.isRun));
     document.body.classList.toggle("is-recording", isRecording());
     list.renew();
     analyser.renew();
@@ -279,7 +276,7 @@
 
   /** Shows whether the page is live. */
   function setLink() {
-    show(get("link"), isOld ? "no connection" : isRecording() ? "recording" : bar.moment ? "paused" : "live");
+    write(get("link"), isOld ? "no connection" : isRecording() ? "recording" : bar.moment ? "paused" : "live");
     get("link").className = isOld ? "tag bad" : isRecording() ? "tag" : bar.moment ? "tag stale" : "tag good";
   }
 
@@ -292,7 +289,7 @@
     },
     access(isRight, refusal) {
       mayForce = isRight;
-      show(get("access"), mayForce ? "may force" : "read-only");
+      write(get("access"), mayForce ? "may force" : "read-only");
       get("access").classList.toggle("good", mayForce);
       document.body.classList.toggle("read-only", !mayForce);
       if (mayForce) tabs.show();
@@ -307,7 +304,7 @@
       document.body.classList.toggle("is-old", isOld);
       setLink();
       get("age").hidden = !isOld;
-      if (isOld) show(get("age"), plant.signals.length ? `No connection to the simulation. What is shown is ${seconds} s old.` : "No connection to the simulation.");
+      if (isOld) write(get("age"), plant.signals.length ? `No connection to the simulation. What is shown is ${seconds} s old.` : "No connection to the simulation.");
       else redraw();
     },
   });

@@ -3,17 +3,18 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::sync::Mutex;
+use std::time::Duration;
 
-use tickbus_base::time::{Nanos, system_time};
+use tickbus_base::time::Nanos;
 use tickbus_web::{Differences, Refused};
 
 use crate::exhibit::Exhibit;
 use crate::order::Order;
 
 /// The drivers and runs, and the number of their current state.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Model {
-    /// The time of day at the beginning, in milliseconds: by it and by the layout, a viewer who comes back knows that the
+    /// Another number for each page that is opened: by it and by the layout, a viewer who connects again knows that the
     /// drivers are still the same.
     run: u128,
     number: u64,
@@ -24,19 +25,6 @@ pub(crate) struct Model {
     now: Nanos,
     /// By their ids.
     drivers: BTreeMap<i32, Box<dyn Exhibit>>,
-}
-
-impl Default for Model {
-    fn default() -> Self {
-        Self {
-            run: system_time().as_millis(),
-            number: 0,
-            layout: 0,
-            layout_number: 0,
-            now: Nanos::ZERO,
-            drivers: BTreeMap::new(),
-        }
-    }
 }
 
 impl Model {
@@ -187,10 +175,18 @@ impl Model {
 }
 
 /// The model, for the room and the page's own thread.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct Shared(Mutex<Model>);
 
 impl Shared {
+    /// The model of a page without drivers, which is opened at this time of day.
+    pub(crate) fn opened(day: Duration) -> Self {
+        Self(Mutex::new(Model {
+            run: day.as_millis(),
+            ..Model::default()
+        }))
+    }
+
     /// Works on the model.
     pub(crate) fn with<R>(&self, work: impl FnOnce(&mut Model) -> R) -> R {
         // After a panic the next look updates every driver anyway.

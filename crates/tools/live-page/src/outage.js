@@ -3,20 +3,9 @@
 // The way from the PLC to the machine as a picture: what is broken, since when, what to do, and the last events.
 
 const outage = (() => {
+  const { make, write } = elements;
   const MARKS = { good: "✓", bad: "✕", unknown: "?" };
   const shown = new Set();
-
-  function make(tag, className, parent, content) {
-    const it = document.createElement(tag);
-    if (className) it.className = className;
-    if (content !== undefined) it.textContent = content;
-    parent.append(it);
-    return it;
-  }
-
-  function say(element, text) {
-    if (element.textContent !== text) element.textContent = text;
-  }
 
   /** The names of the boxes; the driver's own end is the last one. */
   function names(driver) {
@@ -26,7 +15,7 @@ const outage = (() => {
 
   /** Makes the picture of a driver's line; a run on virtual time and a recording have none. */
   function card(driver, parent) {
-    if (driver.kind === "sync" || driver.kind === "recording") return null;
+    if (driver.isRun || driver.isRecording) return null;
     const row = make("ol", "way", parent);
     row.setAttribute("aria-label", "The way to the machine");
     const boxes = names(driver).map((name) => {
@@ -46,8 +35,6 @@ const outage = (() => {
     return { driver, boxes, told, next, more, list: make("ol", "", more), line: null, key: "" };
   }
 
-  const isSilent = (line) => line.silence_ms > 1000;
-
   /** The line as it failed, while another attempt is under way: the picture does not change with each attempt. */
   function beneath(line) {
     const before = line.events.filter(({ kind }) => !kind.startsWith("fault")).at(-2);
@@ -65,7 +52,7 @@ const outage = (() => {
     const check = line.end === "client"
       ? `Start ${them}, or look with “tickbus doctor”.`
       : `Look at cable, switch and ${peer}; “tickbus doctor” looks at each step.`;
-    if (isSilent(line)) return { at: 3, word: "does not tick", what: `The ${own === "Machine" ? "simulation" : "program"} does not tick`, act: "Look at the program: it waits, hangs or has ended.", isOwn: true };
+    if (plant.isSilent(line)) return { at: 3, word: "does not tick", what: `The ${own === "Machine" ? "simulation" : "program"} does not tick`, act: "Look at the program: it waits, hangs or has ended.", isOwn: true };
     if (line.state === "running" && line.status !== "stale") return null;
     switch (line.cause) {
       case "injected": return { at: 1, word: "fault injected", what: "An injected fault holds the line down", act: "End the fault, or wait until it is over." };
@@ -129,7 +116,7 @@ const outage = (() => {
     const { line, next } = own;
     const left = line?.next_ms === undefined || line.isPast ? NaN : line.next_ms - (performance.now() - line.heard);
     next.hidden = Number.isNaN(left);
-    say(next, left > 0 ? `Next try in ${Math.ceil(left / 1000)} s` : "Trying now");
+    write(next, left > 0 ? `Next try in ${Math.ceil(left / 1000)} s` : "Trying now");
   }
 
   function showEvents(own) {
@@ -164,15 +151,15 @@ const outage = (() => {
       const isKnown = !wrong || i > wrong.at && !(wrong.isApart && i === 1) || wrong.isOwn;
       const look = i === wrong?.at ? "bad" : isKnown ? "good" : "unknown";
       it.className = look;
-      say(mark, MARKS[look]);
-      say(text, look === "bad" ? wrong.word : look === "good" ? "works" : "not known");
+      write(mark, MARKS[look]);
+      write(text, look === "bad" ? wrong.word : look === "good" ? "works" : "not known");
     });
     own.told.hidden = !wrong;
     const since = wrong ? clock(own, wrong.isOwn ? line.silence_ms : begun(line)) : "";
     // The text stays the same during an outage, so that it is read aloud once.
     if (!line.isPast && wrong?.what !== own.what) Object.assign(own, { what: wrong?.what, since });
-    if (wrong) say(own.told, `${wrong.what}, since ${line.isPast ? since : own.since}. ${wrong.act}`);
-    else say(own.told, "");
+    if (wrong) write(own.told, `${wrong.what}, since ${line.isPast ? since : own.since}. ${wrong.act}`);
+    else write(own.told, "");
     // Once open, it stays as the viewer has it.
     if (wrong && !own.wasWrong && !own.more.open) own.more.open = matchMedia("(min-width: 641px)").matches;
     own.wasWrong = Boolean(wrong);

@@ -5,7 +5,7 @@ use std::io;
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 
-use tickbus_base::time::Clock;
+use tickbus_base::time::{Clock, system_time};
 use tickbus_driver::Watch;
 use tickbus_virtual_time::Controls;
 use tickbus_web::{Answer, Asset, Change, Document, Outcome, Site, State};
@@ -50,7 +50,8 @@ impl LivePage {
     ///
     /// The system could not start a thread.
     pub fn open(clock: Arc<dyn Clock>) -> io::Result<Self> {
-        let (inbox, model) = (Arc::<Inbox>::default(), Arc::<Shared>::default());
+        let inbox = Arc::<Inbox>::default();
+        let model = Arc::new(Shared::opened(system_time()));
         let (past, door) = Past::open(Arc::clone(&model))?;
         let keeper = Keeper {
             inbox: Arc::clone(&inbox),

@@ -228,7 +228,7 @@ fn reads(name: &str) -> Option<Area> {
     (role != Role::Observer).then(|| role.areas().1)
 }
 
-/// The signals of a recording. A signal of the table has the type that the file has, or is none of this recording.
+/// The signals of a recording. The table adds what the file does not have, if its signal has the type of the file.
 fn signals(columns: &Columns, table: Option<&SignalTable>) -> Vec<Signal> {
     let of = |column: &Column| {
         let station = |name: &String| columns.stations.iter().position(|known| known == name);

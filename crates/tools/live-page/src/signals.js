@@ -25,7 +25,7 @@ const plant = (() => {
   let heard = 0;
 
   function signalOf(driver, given, index) {
-    const words = [given.name, given.address, given.unit ?? "", given.type, driver.kind === "sync" ? driver.stations[given.station] : ""];
+    const words = [given.name, given.address, given.unit ?? "", given.type, driver.isRun ? driver.stations[given.station] : ""];
     const signal = {
       driver, index,
       name: given.name,
@@ -94,7 +94,7 @@ const plant = (() => {
   function takeAll(given) {
     const known = new Map(signals.map((signal) => [keyOf(signal), signal]));
     isPast = false;
-    drivers = given.drivers.map((driver) => ({ ...driver, line: null, past: null, moment: null }));
+    drivers = given.drivers.map((driver) => ({ ...driver, isRun: driver.kind === "sync", isRecording: driver.kind === "recording", line: null, past: null, moment: null }));
     signals = [];
     for (const driver of drivers) {
       driver.signals = driver.signals.map((it, index) => signalOf(driver, it, index));
@@ -221,6 +221,9 @@ const plant = (() => {
   const isForcedNow = ({ live: [, , , flags] }) => (flags & FORCED) !== 0;
   const isFailSafeNow = ({ live: [, , , flags] }) => (flags & FAIL_SAFE) !== 0;
 
+  /** True if the simulation of a line stands still. */
+  const isSilent = (line) => line.silence_ms > 1000;
+
   /** The age of the data of a signal's station, in milliseconds; null if unknown. */
   function age(signal) {
     const line = lineOf(signal.driver);
@@ -229,7 +232,7 @@ const plant = (() => {
   }
 
   return {
-    hear, now, number, measured, age, keyOf, lineOf, showPast, showPresent, isForcedNow, isFailSafeNow,
+    hear, now, number, measured, age, keyOf, lineOf, showPast, showPresent, isForcedNow, isFailSafeNow, isSilent,
     isNew: (signal) => performance.now() - signal.changed < NEW,
     get drivers() { return drivers; },
     get isPast() { return isPast; },

@@ -14,7 +14,7 @@ const touch = (() => {
   /** The part below the pointer, and the one with the focus. */
   let hovered = null;
   let focused = null;
-  /** The pressed buttons by their paths: `{ signal, part, by, since, sent }`, and the paths whose release has not arrived. */
+  /** The pressed buttons by their paths: `{ signal, part, by, since, sent, isPressed, isSeen, isLeft }`, and the paths whose release has not arrived. */
   const held = new Map();
   const owed = new Set();
   let isOld = true;
@@ -147,13 +147,14 @@ const touch = (() => {
     show();
     const answer = await one.sent;
     // Without an answer the press may have arrived, and is released.
-    if (answer?.ok) act.say(`${signal.name} is ${one.isLeft ? "let go" : "pressed"}.`);
+    one.isPressed = answer?.ok === true;
+    if (one.isPressed) act.say(`${signal.name} is ${one.isLeft ? "let go" : "pressed"}.`);
     else if (answer) act.say(answer.text, true);
-    if (!answer?.ok) letGo(path);
+    if (!one.isPressed) letGo(path);
   }
 
   /** Lets go of a button, not before its press has arrived and a slow PLC has seen it. */
-  async function letGo(path) {
+  async function letGo(path, told = `${held.get(path)?.signal.name} is let go.`) {
     const one = held.get(path);
     if (!one || one.isLeft) return;
     one.isLeft = true;
@@ -164,7 +165,7 @@ const touch = (() => {
     // What was refused is not held.
     if (answer === null || answer.ok) {
       owed.add(path);
-      await pay(path, `${one.signal.name} is let go.`);
+      await pay(path, told);
     }
     held.delete(path);
     show();
@@ -299,10 +300,11 @@ const touch = (() => {
     for (const [path, one] of held) {
       const isForced = plant.isForcedNow(one.signal);
       if (one.isSeen && !isForced && !one.isLeft) {
-        held.delete(path);
-        act.say(`${one.signal.name} was let go by another page.`, true);
+        // Released here as well: the mark may be older than the press.
+        letGo(path, `${one.signal.name} was let go by another page.`);
       }
-      one.isSeen ||= isForced;
+      // Until the press is answered, the mark can be that of the press before.
+      one.isSeen ||= one.isPressed && isForced;
     }
     for (const sheet of sheets) showOne(sheet);
   }
@@ -349,7 +351,7 @@ const touch = (() => {
 
   function tell({ tip, frame }, part, left, top) {
     const text = part.control ? `${textOf(part)} – ${HINTS[part.control.do]}` : textOf(part);
-    if (tip.textContent !== text) tip.textContent = text;
+    elements.write(tip, text);
     const box = part.element.getBoundingClientRect();
     const x = Math.max(4, Math.min(box.left - left, frame.clientWidth - tip.offsetWidth - 4));
     const above = box.top - top - tip.offsetHeight - 6;

@@ -11,7 +11,6 @@ const trend = (() => {
   const MOST = 60000;
   let length = LENGTHS[1];
   let colours = null;
-  let isAsking = false;
 
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { colours = null; });
 
@@ -37,16 +36,9 @@ const trend = (() => {
   }
 
   /** Requests what the open trends lack. */
-  async function collect() {
-    if (isAsking || document.hidden) return;
-    isAsking = true;
-    try {
-      await Promise.all(plant.drivers.map(collectOf));
-    } catch {
-      // The page says if the server does not answer; the next request follows.
-    }
-    isAsking = false;
-  }
+  const collect = room.every(PERIOD, async () => {
+    if (!document.hidden) await Promise.all(plant.drivers.map(collectOf));
+  });
 
   async function collectOf(driver) {
     const open = driver.signals.filter((signal) => signal.isOpen && signal.trend);
@@ -76,18 +68,21 @@ const trend = (() => {
     list.redraw();
   }
 
-  /** Adds the changes of an answer from a time on; each is drawn as an edge. */
-  function add(trend, { ms, values }, { to_ms: until, is_sampled: isSampled }, from) {
-    let known = trend.times.length;
-    while (known > 0 && trend.times[known - 1] > from) known -= 1;
-    trend.times.length = known;
-    trend.values.length = known;
-    ms.forEach((time, i) => {
-      const value = values[i] ?? NaN;
-      if (known + i > 0 && Object.is(value, trend.values.at(-1))) return;
-      trend.times.push(time);
-      trend.values.push(value);
+  /** Puts the changes of an answer, from a time on, into the place of those that were known. */
+  function merge({ times, values }, given, from) {
+    while (times.length && times.at(-1) > from) times.pop();
+    values.length = times.length;
+    given.ms.forEach((time, i) => {
+      const value = given.values[i] ?? NaN;
+      if (times.length && Object.is(value, values.at(-1))) return;
+      times.push(time);
+      values.push(value);
     });
+  }
+
+  /** Adds the changes of an answer from a time on; each is drawn as an edge. */
+  function add(trend, given, { to_ms: until, is_sampled: isSampled }, from) {
+    merge(trend, given, from);
     trend.from = Math.min(trend.from, from);
     trend.until = Math.max(trend.until, until);
     trend.isSampled = isSampled;
@@ -204,6 +199,5 @@ const trend = (() => {
     return length;
   }
 
-  setInterval(collect, PERIOD);
-  return { open, close, draw, next, collect, paintUnknown, get length() { return length; } };
+  return { open, close, draw, next, collect, merge, paintUnknown, get length() { return length; } };
 })();

@@ -13,17 +13,16 @@ const trigger = (() => {
     rises: { fits: (was, is) => is > was, done: "rose" },
     falls: { fits: (was, is) => is < was, done: "fell" },
     changes: { fits: (was, is) => !Number.isNaN(was) && !Number.isNaN(is), done: "changed" },
-    above: { fits: (was, is, limit) => is > limit && !(was > limit), done: "went above" },
-    below: { fits: (was, is, limit) => is < limit && !(was < limit), done: "went below" },
-    equals: { fits: (was, is, limit) => is === limit && was !== limit, done: "became" },
+    above: { fits: (was, is, limit) => is > limit && !(was > limit), done: "went above", hasLimit: true },
+    below: { fits: (was, is, limit) => is < limit && !(was < limit), done: "went below", hasLimit: true },
+    equals: { fits: (was, is, limit) => is === limit && was !== limit, done: "became", hasLimit: true },
   };
   let act = {};
   let signals = [];
   /** What is waited for: `{ signal, name, limit, until, was }`; null while it is off. */
   let armed = null;
-  let isAsking = false;
 
-  const hasLimit = () => ["above", "below", "equals"].includes(get("trigger-case").value);
+  const hasLimit = () => CASES[get("trigger-case").value].hasLimit === true;
 
   function show() {
     get("trigger-limit").hidden = !hasLimit();
@@ -40,7 +39,7 @@ const trigger = (() => {
   function arm() {
     const signal = signals.find((it) => plant.keyOf(it) === get("trigger-signal").value);
     if (!signal?.driver.past) return act.say("Put a signal on the axis first.", true);
-    if (signal.driver.kind === "recording") return act.say("A recording has ended: go to its edges with “edge ▸”, or with “Jump to”.", true);
+    if (signal.driver.isRecording) return act.say("A recording has ended: go to its edges with “edge ▸”, or with “Jump to”.", true);
     const text = get("trigger-limit").value.trim().replace(",", ".").replace("−", "-");
     const bools = { TRUE: 1, FALSE: 0 };
     const limit = hasLimit() ? (bools[text.toUpperCase()] ?? (text === "" ? NaN : Number(text))) : 0;
@@ -48,7 +47,7 @@ const trigger = (() => {
       get("trigger-limit").focus();
       return act.say(`"${text}" is not a number; write one such as 12.5.`, true);
     }
-    armed = { signal, name: get("trigger-case").value, limit, until: signal.driver.past.last, was: NaN, isFirst: true };
+    armed = { signal, name: get("trigger-case").value, limit, until: signal.driver.past.last, was: NaN };
     act.follow();
     act.say("The view stops when it happens.");
     show();
@@ -56,29 +55,23 @@ const trigger = (() => {
 
   /** Looks at the changes since the last look. */
   async function look() {
-    if (!armed || isAsking) return;
-    isAsking = true;
+    if (!armed) return;
     const own = armed;
     const { signal } = own;
-    try {
-      const answer = await room.ask(`/trend/${signal.driver.id}/${signal.index}/${own.until}/${FAR}`);
-      if (answer.ok && armed === own) take(own, await answer.json());
-    } catch {
-      // The page says if the server does not answer; the next look sees what this one missed.
-    }
-    isAsking = false;
+    const answer = await room.ask(`/trend/${signal.driver.id}/${signal.index}/${own.until}/${FAR}`);
+    if (answer.ok && armed === own) take(own, await answer.json());
   }
 
   function take(own, { to_ms: until, signals: given }) {
     const { ms, values } = given[own.signal.index];
-    const { fits, done } = CASES[own.name];
+    const { fits, done, hasLimit } = CASES[own.name];
     for (let i = 0; i < ms.length; i++) {
       const is = values[i] ?? NaN;
       if (ms[i] > own.until && fits(own.was, is, own.limit)) {
         disarm();
         act.stop(own.signal.driver, ms[i]);
         const unit = own.signal.unit ? ` ${own.signal.unit}` : "";
-        const limit = ["above", "below", "equals"].includes(own.name) ? ` ${own.limit}${unit}` : "";
+        const limit = hasLimit ? ` ${own.limit}${unit}` : "";
         return act.say(`${own.signal.name} ${done}${limit} at ${words.moment(ms[i])}; the view has stopped there.`);
       }
       own.was = is;
@@ -93,7 +86,7 @@ const trigger = (() => {
     else arm();
   });
 
-  setInterval(look, PERIOD);
+  room.every(PERIOD, look);
   return {
     /** Sets what the page does: `say(text, isBad)`, `follow()`, `stop(driver, ms)`. */
     begin(actions) { act = actions; },

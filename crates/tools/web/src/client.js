@@ -119,5 +119,21 @@ const room = (() => {
     setInterval(setAge, 500);
   }
 
-  return { ask, change, listen };
+  /**
+   * Does `work`, which asks the server, every `period` milliseconds, and never twice at a time. Returns a function that does it
+   * at once. What gets no answer is asked again the next time: the page says if the server does not answer.
+   */
+  function every(period, work) {
+    let isBusy = false;
+    async function now() {
+      if (isBusy) return;
+      isBusy = true;
+      await work().catch(() => {});
+      isBusy = false;
+    }
+    setInterval(now, period);
+    return now;
+  }
+
+  return { ask, change, every, listen };
 })();

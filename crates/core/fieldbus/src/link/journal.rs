@@ -81,7 +81,7 @@ impl LinkStatus {
     }
 
     /// Notes that the line has other settings since `now`.
-    pub fn has_other_settings(&self, now: Nanos) {
+    pub fn note_other_settings(&self, now: Nanos) {
         let mut record = self.lock();
         record.journal.note(now, None, "other settings");
     }
@@ -111,7 +111,7 @@ mod tests {
             status.failed(now, Cause::Link, "refused", now + at(5));
             assert_eq!(status.next_attempt(), Some(now + at(5)));
         }
-        status.has_other_settings(at(400));
+        status.note_other_settings(at(400));
         let events = status.events();
         let states: Vec<_> = events.iter().map(|event| event.entered).collect();
         let failed = Some((LinkState::Failed, Cause::Link));
@@ -129,7 +129,7 @@ mod tests {
     fn only_the_last_ten_events_are_kept() {
         let status = LinkStatus::new("test", at(100));
         for time in 0..25 {
-            status.has_other_settings(at(time));
+            status.note_other_settings(at(time));
         }
         let times: Vec<Nanos> = status.events().iter().map(|event| event.first).collect();
         assert_eq!(times, (15..25).map(at).collect::<Vec<_>>());

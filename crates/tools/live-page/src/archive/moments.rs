@@ -8,9 +8,10 @@ use super::{Archive, FORCE, Mark, millis};
 use crate::events::{self, Event};
 
 impl Archive {
-    /// The state of the line at a time, and its last events; `None` if it is not known.
-    pub(super) fn line_at(&self, time: Nanos) -> Option<Value> {
-        let faults = events_of(&self.timed_marks(), time);
+    /// The state of the line at a tick and its time, and its last events; `None` if it is not known.
+    pub(super) fn line_at(&self, (tick, time): (u64, Nanos)) -> Option<Value> {
+        let faults = self.last_marks(events::MOST, |mark| is_fault(mark) && mark.tick <= tick);
+        let mut events = events_of(&faults, time);
         let notes = self.notes();
         let known = notes.lines.partition_point(|line| line.at <= time);
         let line = notes.lines.get(known.checked_sub(1)?)?;
@@ -18,15 +19,17 @@ impl Archive {
         let has_run = before
             .clone()
             .any(|line| matches!(line.state, LinkState::Running | LinkState::Stale));
-        let mut events = faults;
         let mut last = None;
-        for line in before {
-            // A reason in other words is no event.
-            if last.replace((line.state, line.cause)) != Some((line.state, line.cause)) {
-                let ago = time - line.at;
-                events.push(Event::entered(line.state, line.cause, &line.reason, ago));
-            }
-        }
+        // A reason in other words is no event.
+        let entered = before.filter(|line| {
+            last.replace((line.state, line.cause)) != Some((line.state, line.cause))
+        });
+        let entered: Vec<_> = entered.collect();
+        let skipped = entered.len().saturating_sub(events::MOST);
+        events.extend(entered[skipped..].iter().map(|line| {
+            let ago = time - line.at;
+            Event::entered(line.state, line.cause, &line.reason, ago)
+        }));
         Some(json!({
             "state": line.state.name(), "cause": line.cause, "reason": line.reason,
             "since_ms": millis(time - line.at), "has_run": has_run, "events": events::last(events),
@@ -47,14 +50,11 @@ fn is_fault(mark: &Mark) -> bool {
     !mark.name.starts_with(FORCE)
 }
 
-/// The faults up to a time as events.
-fn events_of(marks: &[Mark], time: Nanos) -> Vec<Event> {
-    let timed = marks
-        .iter()
-        .filter(|mark| is_fault(mark))
-        .filter_map(|mark| {
-            let at = mark.at.filter(|at| *at <= time)?;
-            Some(Event::fault(mark.begins, &mark.text, time - at))
-        });
-    events::last(timed.collect())
+/// The faults up to a time as events, the oldest first.
+fn events_of(faults: &[Mark], time: Nanos) -> Vec<Event> {
+    let timed = faults.iter().filter_map(|mark| {
+        let at = mark.at.filter(|at| *at <= time)?;
+        Some(Event::fault(mark.begins, &mark.text, time - at))
+    });
+    timed.collect()
 }

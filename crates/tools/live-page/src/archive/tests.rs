@@ -192,7 +192,8 @@ fn a_moment_has_the_line_and_the_events_before_it() {
     // A push-button that is held is no event of the line.
     archive.note_faults(&[leak, forced(2, Phase::Active, 13, 13)], 0);
     let kinds = |millis| {
-        let line = archive.line_at(Nanos::from_millis(millis))?;
+        let tick = u64::try_from(millis).expect("a tick a millisecond");
+        let line = archive.line_at((tick, Nanos::from_millis(millis)))?;
         let events = line["events"].as_array()?.iter();
         let kinds: Vec<_> = events.filter_map(|it| it["kind"].as_str()).collect();
         let kinds = kinds.join(" ");

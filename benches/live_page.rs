@@ -136,7 +136,10 @@ impl Cell {
             let page = LivePage::open(Monotonic::shared()).expect("a thread");
             let room = Room::bind(&Address::local(0), Limits::default()).expect("a port");
             let address = room.address();
-            let serving = room.serve(page.site(), Monotonic::shared());
+            let serving = room.serve(
+                tickbus_web::Pages::of("Live page", page.site()),
+                Monotonic::shared(),
+            );
             (serving.expect("a thread"), page, address)
         });
         let member = page.as_ref().map(|(_, page, _)| {

@@ -124,7 +124,8 @@ fn serve_page(
     }
     say(&format!("page at {}", room.url()));
     let site = tickbus_patch_bay::PatchBay::new(door.clone());
-    room.serve(std::sync::Arc::new(site), Monotonic::shared())
+    let pages = tickbus_web::Pages::of("Patch bay", std::sync::Arc::new(site));
+    room.serve(pages, Monotonic::shared())
 }
 
 /// Stops the dispatcher after `span`, unless the process ends earlier.

@@ -76,7 +76,7 @@ mod served {
         let asked = arguments.page.listen();
         let serving = Room::bind(&asked, Limits::default()).and_then(|room| {
             let url = room.url().replacen("/#", "/studio#", 1);
-            let serving = room.serve(studio.site(), Monotonic::shared())?;
+            let serving = room.serve(studio.pages(), Monotonic::shared())?;
             Ok((url, serving))
         });
         let (url, serving) = match serving {

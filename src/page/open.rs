@@ -10,9 +10,9 @@ use tickbus_driver_cfg::Config;
 use tickbus_live_page::picture::{self, Picture};
 use tickbus_live_page::{LivePage, Member, Options, Recorded};
 use tickbus_net::Address;
-use tickbus_studio::{Running, Seat, Studios};
+use tickbus_studio::{Running, Seat};
 use tickbus_virtual_time::Controls;
-use tickbus_web::{Limits, Room, Serving};
+use tickbus_web::{Limits, Pages, Room, Serving};
 
 use super::{PageError, Read, Shown};
 
@@ -28,7 +28,7 @@ struct Open {
     // Dropped in this order, so that nobody asks a page that has ended.
     _serving: Serving,
     page: LivePage,
-    studios: Studios,
+    pages: Pages,
     /// True if only this computer reaches the page.
     is_here: bool,
     url: String,
@@ -124,7 +124,7 @@ impl Open {
             line,
             read,
         };
-        let seat = self.studios.join(running);
+        let seat = Seat::join(&self.pages, running);
         seat.map_err(|why| PageError::WrongInput(format!("{file} cannot be edited: {why}")))
     }
 }
@@ -207,13 +207,13 @@ fn open(
     }
     let url = room.url();
     let page = LivePage::open(Monotonic::shared()).map_err(refused)?;
-    let studios = Studios::beside(page.site());
+    let pages = Pages::of("Live page", page.site());
     let is_here = room.address().ip().is_loopback();
-    let serving = room.serve(studios.site(), Monotonic::shared());
+    let serving = room.serve(pages.clone(), Monotonic::shared());
     let open = Arc::new(Open {
         _serving: serving.map_err(refused)?,
         page,
-        studios,
+        pages,
         is_here,
         url,
         asked: asked.clone(),

@@ -75,7 +75,10 @@ fn the_cursor_goes_from_edge_to_edge_of_a_driver_whose_ticks_the_bar_does_not_ha
     let page = LivePage::open(Monotonic::shared()).expect("a thread");
     let room = Room::bind(&Address::local(0), Limits::default()).expect("a port");
     let address = room.address();
-    let _serving = room.serve(page.site(), Monotonic::shared());
+    let _serving = room.serve(
+        tickbus_web::Pages::of("Live page", page.site()),
+        Monotonic::shared(),
+    );
     // The bar shows the time of the first one.
     let _slow = Ticking::start(&page, 1, "Slow", Nanos::from_millis(97));
     let _fast = Ticking::start(&page, 2, "Fast", Nanos::from_millis(11));

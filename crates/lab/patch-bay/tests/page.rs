@@ -95,7 +95,12 @@ fn serve(test: impl FnOnce(SocketAddr, &Page)) {
         token: url.split_once("#token=").expect("a token").1.to_owned(),
     };
     let site = Arc::new(PatchBay::new(door.clone()));
-    let _serving = room.serve(site, Monotonic::shared()).expect("a thread");
+    let _serving = room
+        .serve(
+            tickbus_web::Pages::of("Patch bay", site),
+            Monotonic::shared(),
+        )
+        .expect("a thread");
     thread::scope(|scope| {
         let served = scope.spawn(|| {
             let hosting = Hosting {

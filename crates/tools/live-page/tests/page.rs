@@ -183,7 +183,10 @@ impl Page {
         let address = room.address();
         let (_, token) = room.url().split_once("#token=").map(own).expect("a token");
         let serving = room
-            .serve(live.site(), Monotonic::shared())
+            .serve(
+                tickbus_web::Pages::of("Live page", live.site()),
+                Monotonic::shared(),
+            )
             .expect("a thread");
         Self {
             _serving: serving,

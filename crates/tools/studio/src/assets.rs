@@ -1,14 +1,12 @@
-//! The files of the page, beside those of the live page.
-
-use std::sync::OnceLock;
+//! The files of the page; it uses those of the live page, too.
 
 use tickbus_web::Asset;
 
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 
-const OWN: &[Asset] = &[
+pub(crate) const ASSETS: &[Asset] = &[
     Asset {
-        path: "/studio",
+        path: "/",
         kind: "text/html; charset=utf-8",
         text: include_str!("studio.html"),
     },
@@ -48,9 +46,3 @@ const OWN: &[Asset] = &[
         text: include_str!("bus.js"),
     },
 ];
-
-/// The files of the studio and these, which are the live page's.
-pub(crate) fn assets(live: &[Asset]) -> &'static [Asset] {
-    static ALL: OnceLock<Vec<Asset>> = OnceLock::new();
-    ALL.get_or_init(|| OWN.iter().chain(live).copied().collect())
-}

@@ -28,8 +28,8 @@ impl Question {
     /// The question that a page asks by this path, with this body; `None` for another path.
     pub(crate) fn asked(path: &str, body: &str) -> Option<Result<Self, String>> {
         match path {
-            "/studio/examine" => Some(Ok(Self::Line)),
-            "/studio/find" => Some(targets(body).map(Self::Network)),
+            "/examine" => Some(Ok(Self::Line)),
+            "/find" => Some(targets(body).map(Self::Network)),
             _ => None,
         }
     }

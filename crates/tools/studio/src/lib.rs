@@ -1,6 +1,6 @@
 //! The studio: a driver.cfg in a browser, edited in a table with the checker's words at the cell, and its line beside it.
 //!
-//! A [`Studio`] is a [`Site`](tickbus_web::Site) around that of the live page: what runs is shown there, forced there,
+//! A studio is a page beside the live page: what runs is shown there, forced there,
 //! and fills the values of the table. Every edit is written into the file at once, keeps comments and order, and can be
 //! undone. A file that another program changes meanwhile is read again; nothing of it is overwritten.
 
@@ -33,7 +33,7 @@ mod running_tests;
 #[cfg(test)]
 mod tests;
 
-pub use beside::{Seat, Studios};
+pub use beside::Seat;
 pub use line::{Machine, Opened};
 pub use running::{Read, Running};
 pub use site::{Settings, Studio, Unsaved};

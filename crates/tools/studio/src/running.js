@@ -9,7 +9,7 @@ const running = (() => {
    * The number of the driver: from the page's address, or else from the first state. The page keeps to it, because another
    * driver that joins the room may become the first.
    */
-  let driver = new URLSearchParams(location.search).get("driver");
+  let driver = /^\/studio\/of\/([^/]+)/.exec(location.pathname)?.[1] ?? null;
 
   /** Keeps to the driver whose file the page shows. */
   function keep(line) {
@@ -38,7 +38,7 @@ const running = (() => {
 
   return {
     /** Where the requests for the file go. */
-    get base() { return driver ? `/studio/of/${encodeURIComponent(driver)}` : "/studio"; },
+    get base() { return driver ? `/studio/of/${driver}` : "/studio"; },
     keep,
     mine,
     show,

@@ -44,7 +44,7 @@ impl Fixture {
             read: Box::new(read),
         };
         let page = LivePage::open(Monotonic::shared()).expect("a thread");
-        let studio = Studio::of_running(running, page.site()).expect("it can be read");
+        let studio = Studio::of_running(running).expect("it can be read");
         Self {
             folder,
             driver: Some(driver),
@@ -67,7 +67,7 @@ impl Fixture {
         let studio = self.studio.as_ref().expect("open");
         studio.change(&Change {
             verb: Verb::Put,
-            path: format!("/studio/{path}"),
+            path: format!("/{path}"),
             body: body.to_owned(),
         })
     }

@@ -1,4 +1,4 @@
-//! The studio as a site: its own paths begin with `/studio`, all others are the live page's.
+//! The studio as a site, which joins the live page's room at `/studio`.
 
 use std::fmt;
 use std::io;
@@ -9,9 +9,11 @@ use serde_json::json;
 use tickbus_base::time::{Monotonic, Stop};
 use tickbus_driver_cfg::{Config, Kinds};
 use tickbus_live_page::LivePage;
-use tickbus_web::{Answer, Asset, Change, Document, Outcome, Refused, Site, State, Verb};
+use tickbus_web::{
+    Answer, Asset, Change, Document, Outcome, Page, Pages, Refused, Site, State, Verb,
+};
 
-use crate::assets::assets;
+use crate::assets::ASSETS;
 use crate::browse::{Tags, settings};
 use crate::desk::{Desk, Refusal};
 use crate::edit::Edit;
@@ -61,7 +63,6 @@ enum Owner {
 struct Shared {
     kinds: &'static Kinds,
     owner: Owner,
-    live: Arc<dyn Site>,
     tags: Arc<Tags>,
     state: Mutex<Room>,
 }
@@ -109,12 +110,11 @@ impl Studio {
     /// The file cannot be read, or the system has no thread.
     pub fn open(settings: Settings) -> Result<Self, String> {
         let page = LivePage::open(Monotonic::shared()).map_err(|error| error.to_string())?;
-        let live = page.site();
         let owner = Owner::Studio {
             machine: settings.machine,
             page: Box::new(page),
         };
-        Self::of(&settings.path, settings.kinds, owner, live)
+        Self::of(&settings.path, settings.kinds, owner)
     }
 
     /// Reads the file of a driver that runs, which the live page shows.
@@ -122,17 +122,12 @@ impl Studio {
     /// # Errors
     ///
     /// The file cannot be read.
-    pub(crate) fn of_running(running: Running, live: Arc<dyn Site>) -> Result<Self, String> {
+    pub(crate) fn of_running(running: Running) -> Result<Self, String> {
         let (path, kinds) = (running.path(), running.kinds);
-        Self::of(&path, kinds, Owner::Simulation(running), live)
+        Self::of(&path, kinds, Owner::Simulation(running))
     }
 
-    fn of(
-        path: &Path,
-        kinds: &'static Kinds,
-        owner: Owner,
-        live: Arc<dyn Site>,
-    ) -> Result<Self, String> {
+    fn of(path: &Path, kinds: &'static Kinds, owner: Owner) -> Result<Self, String> {
         let room = Room {
             desk: Desk::open(path, kinds)?,
             line: None,
@@ -147,15 +142,24 @@ impl Studio {
         Ok(Self(Arc::new(Shared {
             kinds,
             owner,
-            live,
             tags: Arc::default(),
             state: Mutex::new(room),
         })))
     }
 
-    /// The site that the room serves.
-    pub fn site(&self) -> Arc<dyn Site> {
-        Arc::new(StudioSite(Arc::clone(&self.0)))
+    /// The pages that the room serves: the studio, and the live page of its line.
+    pub fn pages(&self) -> Pages {
+        let live = match &self.0.owner {
+            Owner::Studio { page, .. } => Pages::of("Live page", page.site()),
+            Owner::Simulation(_) => Pages::default(),
+        };
+        live.with(self.page())
+    }
+
+    /// The page of the studio alone.
+    pub(crate) fn page(&self) -> Page {
+        let site = StudioSite(Arc::clone(&self.0));
+        Page::new("Studio", "/studio", Arc::new(site))
     }
 
     /// The state that the page shows, or its number alone if `seen` is that.
@@ -375,7 +379,7 @@ impl Shared {
 
     fn change(&self, change: &Change) -> Result<(), Refusal> {
         let none = || (404, format!("{} cannot be changed", change.path));
-        let path = change.path.strip_prefix("/studio/").ok_or_else(none)?;
+        let path = change.path.strip_prefix('/').ok_or_else(none)?;
         if change.verb != Verb::Put {
             return Err((405, "use PUT".to_owned()));
         }
@@ -489,24 +493,19 @@ impl StudioSite {
 
 impl Site for StudioSite {
     fn assets(&self) -> &[Asset] {
-        assets(self.0.live.assets())
+        ASSETS
     }
 
-    fn is_private(&self, path: &str) -> bool {
-        path.starts_with("/studio/")
+    fn is_private(&self, _: &str) -> bool {
+        true
     }
 
-    fn longest_body(&self, path: &str) -> usize {
-        if path.starts_with("/studio/") {
-            BODY
-        } else {
-            self.0.live.longest_body(path)
-        }
+    fn longest_body(&self, _: &str) -> usize {
+        BODY
     }
 
-    fn look(&self, answer: Answer<State>) {
-        self.0.live.look(answer);
-    }
+    /// Gives no answer: the page asks for the state of its file, and listens to the live page.
+    fn look(&self, _: Answer<State>) {}
 
     fn get(&self, path: &str, answer: Answer<Option<Document>>) {
         let json = |text| {
@@ -515,36 +514,22 @@ impl Site for StudioSite {
                 text,
             })
         };
-        if let Some(seen) = path.strip_prefix("/studio/state/") {
+        if let Some(seen) = path.strip_prefix("/state/") {
             let seen = seen.to_owned();
             self.apart(answer, move |shared| json(shared.state(&seen)));
-        } else if path == "/tabs" {
-            let tabs = json!([
-                { "path": "/", "name": "Live page" },
-                { "path": "/studio", "name": "Studio" },
-            ]);
-            answer.give(json(tabs.to_string()));
-        } else if let Some(id) = path.strip_prefix("/studio/tags/") {
+        } else if let Some(id) = path.strip_prefix("/tags/") {
             let id = decoded(id);
             self.apart(answer, move |shared| json(shared.tags(&id)));
-        } else if path == "/studio/schema" {
+        } else if path == "/schema" {
             self.apart(answer, move |shared| {
                 json(tickbus_schema::schema(shared.kinds).to_string())
             });
         } else {
-            self.0.live.get(path, answer);
+            answer.give(None);
         }
-    }
-
-    fn heard(&self, viewers: usize) {
-        self.0.live.heard(viewers);
     }
 
     fn change(&self, change: Change, answer: Answer<Outcome>) {
-        if !change.path.starts_with("/studio/") {
-            self.0.live.change(change, answer);
-            return;
-        }
         if let Some(asked) = Question::asked(&change.path, &change.body) {
             let begun = asked.map_err(|why| (400, why));
             let begun = begun.and_then(|question| self.ask(question));

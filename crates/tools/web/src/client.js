@@ -7,6 +7,8 @@ const room = (() => {
   const PATIENCE = 2500;
   /** The time-out of a request. */
   const LONGEST = 10000;
+  /** The path of this page, which its own requests begin with; empty for the first page of the room. */
+  const base = location.pathname.replace(/\/$/, "");
   let tell = {};
   /** The event source of this tab, and its token. */
   let mine = null;
@@ -135,5 +137,5 @@ const room = (() => {
     return now;
   }
 
-  return { ask, change, every, listen };
+  return { ask, base, change, every, listen };
 })();

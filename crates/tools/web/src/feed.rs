@@ -9,7 +9,8 @@ use tickbus_base::time::{Clock, Nanos};
 use tokio::sync::{Notify, watch};
 use tokio::time::timeout;
 
-use crate::site::{Answer, Differences, Site, State};
+use crate::pages::Pages;
+use crate::site::{Answer, Differences, State};
 
 /// The shortest time between two looks.
 const PERIOD: Duration = Duration::from_micros(16_667);
@@ -220,7 +221,7 @@ impl Feed {
     }
 
     /// Looks at the site while there are viewers, until the site has ended.
-    pub(crate) async fn run(&self, site: Arc<dyn Site>) {
+    pub(crate) async fn run(&self, pages: &Pages) {
         loop {
             while self.state.receiver_count() == 0 {
                 // The state may be outdated when the next viewer comes.
@@ -230,7 +231,9 @@ impl Feed {
             let changes = self.changes.load(Ordering::Relaxed);
             let asked = self.clock.now();
             let (answer, state) = Answer::new();
-            site.look(answer);
+            if let Some((site, _)) = pages.page_of("/") {
+                site.look(answer);
+            }
             let Ok(state) = state.await else {
                 self.state.send_replace(Newest::Ended);
                 return;

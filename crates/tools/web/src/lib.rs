@@ -1,7 +1,7 @@
 //! The web room, which serves live pages.
 //!
-//! A [`Site`] provides the files of a page, its state while there are viewers, and carries out changes. The [`Room`]
-//! does the rest: one thread, a token without which nothing can be changed, the refusal of requests from other sites,
+//! A [`Site`] provides the files of a page, its state while there are viewers, and carries out changes. [`Pages`] are
+//! the sites of one room. The [`Room`] does the rest: one thread, a token without which nothing can be changed, the refusal of requests from other sites,
 //! limits, and server-sent events that give every viewer the newest state: all of it, or just the differences.
 //!
 //! The room uses hyper, not the framework axum on top of it: axum's own server limits neither the time for headers nor
@@ -9,6 +9,7 @@
 
 mod feed;
 mod guard;
+mod pages;
 mod patient;
 mod room;
 mod seats;
@@ -16,8 +17,11 @@ mod serve;
 mod site;
 mod token;
 
+pub use pages::{Joined, Page, Pages};
 pub use room::{Limits, Room, Serving};
-pub use site::{Answer, Asset, Change, Differences, Document, Outcome, Refused, Site, State, Verb};
+pub use site::{
+    Answer, Asset, Change, Differences, Document, Outcome, Refused, Site, State, Tab, Verb,
+};
 
 /// The shared parts of every page's scripts: the token, requests, events.
 pub const CLIENT: &str = include_str!("client.js");

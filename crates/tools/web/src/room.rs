@@ -19,10 +19,10 @@ use tokio::sync::oneshot;
 
 use crate::feed::Feed;
 use crate::guard::Guard;
+use crate::pages::Pages;
 use crate::patient::Patient;
 use crate::seats::Seats;
 use crate::serve::{Hall, answer};
-use crate::site::Site;
 use crate::token;
 
 /// The longest head of a request, in bytes: four times what a browser sends.
@@ -119,12 +119,12 @@ impl Room {
         format!("http://{}:{port}/#token={}", self.host, self.guard.token())
     }
 
-    /// Serves a page, in a separate thread, until the returned value is dropped.
+    /// Serves these pages, in a separate thread, until the returned value is dropped.
     ///
     /// # Errors
     ///
     /// The system could not start a thread, or cannot wait for sockets.
-    pub fn serve(self, site: Arc<dyn Site>, clock: Arc<dyn Clock>) -> io::Result<Serving> {
+    pub fn serve(self, pages: Pages, clock: Arc<dyn Clock>) -> io::Result<Serving> {
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_io()
             .enable_time()
@@ -135,7 +135,7 @@ impl Room {
             .spawn(move || {
                 let limits = self.limits;
                 let hall = Arc::new(Hall {
-                    site: Arc::clone(&site),
+                    pages,
                     guard: self.guard,
                     feed: Feed::new(clock),
                     patience: limits.patience,
@@ -144,7 +144,7 @@ impl Room {
                 runtime.block_on(async {
                     tokio::select! {
                         () = accept(self.listener, &hall, limits) => {}
-                        () = async { hall.feed.run(site).await; std::future::pending().await } => {}
+                        () = async { hall.feed.run(&hall.pages).await; std::future::pending().await } => {}
                         _ = stopped => {}
                     }
                 });
@@ -156,7 +156,7 @@ impl Room {
     }
 }
 
-/// A page being served; dropping it ends that.
+/// Pages being served; dropping it ends that.
 #[derive(Debug)]
 pub struct Serving {
     stop: Option<oneshot::Sender<()>>,

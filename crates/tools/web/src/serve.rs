@@ -18,7 +18,8 @@ use tokio::time::{Interval, interval, timeout};
 
 use crate::feed::{Feed, Viewer, json};
 use crate::guard::{Guard, Token};
-use crate::site::{Answer, Change, Site, Verb};
+use crate::pages::Pages;
+use crate::site::{Answer, Change, Verb};
 
 /// A viewer gets a message at least this often while the site answers; a page without messages knows that its contents
 /// are outdated.
@@ -32,7 +33,7 @@ const JSON: &str = "application/json";
 
 /// The data shared by all connections.
 pub(crate) struct Hall {
-    pub(crate) site: Arc<dyn Site>,
+    pub(crate) pages: Pages,
     pub(crate) guard: Guard,
     pub(crate) feed: Feed,
     pub(crate) patience: Duration,
@@ -43,7 +44,7 @@ pub(crate) struct Hall {
 impl Hall {
     /// Reports activity of a viewer with the token to the site.
     fn heard(&self) {
-        self.site.heard(self.holders.load(Ordering::Relaxed));
+        self.pages.heard(self.holders.load(Ordering::Relaxed));
     }
 }
 
@@ -126,9 +127,9 @@ async fn respond(hall: &Arc<Hall>, request: Request<Incoming>) -> Result<Respons
     if token != Token::Right {
         return Err(no_token(token));
     }
-    let body = body(hall, request, hall.site.longest_body(&path)).await?;
+    let body = body(hall, request, hall.pages.longest_body(&path)).await?;
     let (answer, outcome) = Answer::new();
-    hall.site.change(Change { verb, path, body }, answer);
+    hall.pages.change(Change { verb, path, body }, answer);
     let outcome = timeout(hall.patience, outcome).await;
     let outcome = outcome.map_err(|_| undecided())?.map_err(|_| nobody())?;
     // A refused change changed nothing, unless the site itself failed.
@@ -158,21 +159,21 @@ async fn get(hall: &Arc<Hall>, path: &str, token: Token) -> Result<Response<Body
             Ok(full(JSON, json(&state.ok_or_else(nobody)?)))
         }
         "/events" => Ok(events(hall, token)),
+        "/tabs" => Ok(full(JSON, hall.pages.tabs().to_string())),
         "/access" if token == Token::Wrong => Err(no_token(token)),
         "/access" => Ok(full(
             JSON,
             format!("{{\"may_change\":{}}}\n", token == Token::Right),
         )),
         _ => {
-            let asset = hall.site.assets().iter().find(|asset| asset.path == path);
-            if let Some(asset) = asset {
+            if let Some(asset) = hall.pages.asset(path) {
                 return Ok(full(asset.kind, asset.text));
             }
-            if hall.site.is_private(path) && token != Token::Right {
+            if hall.pages.is_private(path) && token != Token::Right {
                 return Err(no_token(token));
             }
             let (answer, document) = Answer::new();
-            hall.site.get(path, answer);
+            hall.pages.get(path, answer);
             let document = timeout(hall.patience, document).await;
             let document = document.map_err(|_| hung())?.map_err(|_| nobody())?;
             let none = || (StatusCode::NOT_FOUND, format!("there is no {path} here"));

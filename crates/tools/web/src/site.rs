@@ -9,7 +9,7 @@ use tokio::sync::oneshot::{Receiver, Sender, channel};
 ///
 /// The room's thread makes all calls, and all viewers wait for it: they must not block.
 pub trait Site: Send + Sync + 'static {
-    /// The files; the page itself has the path `/`.
+    /// The files; the page itself has the path `/`. All paths are those within the page: see [`Pages`](crate::Pages).
     fn assets(&self) -> &[Asset];
 
     /// Makes the current state and passes it to `answer`. Called at most 60 times a second, and only while there are
@@ -35,6 +35,12 @@ pub trait Site: Send + Sync + 'static {
         4096
     }
 
+    /// The tabs of this page, if it has several or other ones than that of the name with which it joined its room; asked
+    /// for by each viewer that comes.
+    fn tabs(&self) -> Vec<Tab> {
+        Vec::new()
+    }
+
     /// A viewer with the token was active: by a request, or by coming or going. There are now `viewers` of them.
     fn heard(&self, viewers: usize) {
         let _ = viewers;
@@ -53,6 +59,15 @@ pub struct Asset {
     pub kind: &'static str,
     /// The content.
     pub text: &'static str,
+}
+
+/// A tab of a page.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Tab {
+    /// The name, such as "Signals".
+    pub name: String,
+    /// What follows the path of the page, such as `#signals`; empty for the page itself.
+    pub fragment: String,
 }
 
 /// A document made for one request.

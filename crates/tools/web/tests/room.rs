@@ -11,7 +11,7 @@ use std::time::Duration;
 use tickbus_base::time::{Manual, Nanos};
 use tickbus_net::Address;
 use tickbus_web::{
-    Answer, Asset, Change, Limits, Outcome, Refused, Room, Serving, Site, State, Verb,
+    Answer, Asset, Change, Limits, Outcome, Pages, Refused, Room, Serving, Site, State, Verb,
 };
 
 /// A page with one text that can be changed.
@@ -98,7 +98,7 @@ fn serve(limits: Limits) -> Fixture {
     let toy = Arc::new(Toy::default());
     let site: Arc<Toy> = Arc::clone(&toy);
     let clock = Arc::clone(&toy.clock);
-    let serving = room.serve(site, clock).expect("a thread");
+    let serving = room.serve(Pages::of("Toy", site), clock).expect("a thread");
     Fixture {
         toy,
         address,

@@ -53,7 +53,9 @@ pub mod fieldbus;
 mod fmi_api;
 #[cfg(feature = "doors")]
 mod jni;
-mod page;
+/// The live page of this process, for the Python package.
+#[doc(hidden)]
+pub mod page;
 
 pub use tickbus_axis as axis;
 pub use tickbus_base::{Mistake, os, statistics, time, toml_text};

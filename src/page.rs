@@ -8,19 +8,17 @@ mod none;
 mod open;
 
 #[cfg(not(feature = "page"))]
-pub(crate) use none::{Place, show, show_run};
+pub(crate) use none::{show, show_run};
 #[cfg(feature = "page")]
-pub(crate) use open::{Place, options, picture_at, show, show_recording, show_run};
+pub(crate) use open::{options, picture_at, show, show_recording, show_run};
 
-#[cfg(all(feature = "doors", not(feature = "page")))]
-pub(crate) use none::url;
-#[cfg(all(feature = "doors", feature = "page"))]
-pub(crate) use open::url;
+#[cfg(not(feature = "page"))]
+pub use none::{Place, url};
+#[cfg(feature = "page")]
+pub use open::{Place, url};
 
 use tickbus_binding::Refusal;
-#[cfg(feature = "doors")]
-use tickbus_driver::Driver;
-use tickbus_driver::{Code, Line, Watch};
+use tickbus_driver::{Code, Driver, Line, Watch};
 use tickbus_driver_cfg::Config;
 
 /// The end of a line that a page shows, and that it edits if the driver.cfg says so.
@@ -69,8 +67,11 @@ impl std::fmt::Display for PageError {
 
 /// Shows a simulation's driver on the page, if its driver.cfg asks for one. The address is printed on stderr, for
 /// whoever started the simulation.
-#[cfg(feature = "doors")]
-pub(crate) fn show_driver(driver: &mut Driver) -> Result<Option<Place>, Refusal> {
+///
+/// # Errors
+///
+/// The picture of the page, its address or its token is wrong, or this build has no pages.
+pub fn show_driver(driver: &mut Driver) -> Result<Option<Place>, Refusal> {
     use std::io::Write as _;
 
     let config = std::sync::Arc::clone(driver.config());

@@ -346,6 +346,12 @@ impl Driver {
         Self::done(py, py.detach(|| self.handle.close()))
     }
 
+    /// The address of the live page on which the driver is shown, for a browser; ``None`` if driver.cfg has no ``[page]``.
+    /// It contains the page's token: everyone who has it can force signals.
+    fn page(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        Self::done(py, py.detach(|| self.handle.page()))
+    }
+
     fn _statistics(&self, py: Python<'_>) -> PyResult<String> {
         let snapshot = Self::done(py, py.detach(|| self.handle.snapshot()))?;
         Ok(snapshot.to_string())

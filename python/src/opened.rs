@@ -5,6 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use tickbus::page::{self, Place};
 use tickbus_base::time::Nanos;
 use tickbus_binding::{Handles, Refusal, Reload, SignalDescription, closing, open};
 use tickbus_driver::{Code, Driver, Exchange, Snapshot};
@@ -51,6 +52,8 @@ struct Opened {
     /// The slots that this end writes, and those that it reads.
     written: Vec<Range<usize>>,
     read: Vec<Range<usize>>,
+    /// The driver's place on the live page.
+    _shown: Option<Place>,
 }
 
 impl Opened {
@@ -192,15 +195,9 @@ impl Handle {
         Refusal::instead_of_panic(|| {
             tickbus_base::os::log_to_stderr(log::LevelFilter::Warn);
             let place = DRIVERS.reserve()?;
-            let driver = open(path, tables, &KINDS)?;
+            let mut driver = open(path, tables, &KINDS)?;
             let config = Arc::clone(driver.config());
-            if config.page.is_some() {
-                log::warn!(
-                    "driver \"{}\": {} asks for a live page, and simulations in Python have none",
-                    config.name,
-                    config.path.display()
-                );
-            }
+            let shown = page::show_driver(&mut driver)?;
             let signals: Vec<Description> = (0..config.table.signals.len())
                 .map(|index| Description::of(&SignalDescription::of(&driver, index), &config))
                 .collect();
@@ -218,6 +215,7 @@ impl Handle {
                 driver,
                 slots,
                 memory: Arc::clone(&memory),
+                _shown: shown,
             };
             let number = place.fill(&config.name, opened);
             Ok(Facts {
@@ -298,6 +296,11 @@ impl Handle {
 
     pub(crate) fn snapshot(&self) -> Result<Snapshot, Refusal> {
         self.visit(|opened| opened.driver.snapshot())
+    }
+
+    /// Returns the address of the page on which the driver is shown.
+    pub(crate) fn page(&self) -> Result<Option<String>, Refusal> {
+        Ok(self.config()?.page.as_ref().and_then(|_| page::url()))
     }
 
     pub(crate) fn swallowed(&self) -> Result<String, Refusal> {

@@ -8,7 +8,7 @@ use super::{PageError, Shown};
 
 /// The place of a driver on the page; without pages there is none.
 #[derive(Debug)]
-pub(crate) enum Place {}
+pub enum Place {}
 
 /// Does nothing, unless the driver.cfg asks for a page, which is an error.
 pub(crate) fn show(
@@ -44,7 +44,6 @@ pub(crate) fn show_run(
 }
 
 /// Returns `None`: there is no page.
-#[cfg(feature = "doors")]
-pub(crate) fn url() -> Option<String> {
+pub const fn url() -> Option<String> {
     None
 }

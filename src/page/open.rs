@@ -38,7 +38,7 @@ struct Open {
 
 /// The place of a driver or a run on the page.
 #[derive(Debug)]
-pub(crate) struct Place {
+pub struct Place {
     seat: Option<Seat>,
     member: Option<Member>,
     open: Option<Arc<Open>>,
@@ -61,8 +61,7 @@ fn present() -> MutexGuard<'static, Weak<Open>> {
 }
 
 /// Returns the address of the page with its token, if there is a page.
-#[cfg(feature = "doors")]
-pub(crate) fn url() -> Option<String> {
+pub fn url() -> Option<String> {
     Some(present().upgrade()?.url.clone())
 }
 

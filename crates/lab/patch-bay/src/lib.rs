@@ -35,6 +35,16 @@ const ASSETS: &[Asset] = &[
         text: tickbus_web::CLIENT,
     },
     Asset {
+        path: "/head.js",
+        kind: "text/javascript; charset=utf-8",
+        text: tickbus_web::HEAD,
+    },
+    Asset {
+        path: "/room.css",
+        kind: "text/css; charset=utf-8",
+        text: tickbus_web::STYLE,
+    },
+    Asset {
         path: "/board.js",
         kind: "text/javascript; charset=utf-8",
         text: include_str!("board.js"),

@@ -17,7 +17,7 @@
   }
 
   async function change(method, path, body, done) {
-    const said = await room.change(method, path, body);
+    const said = await room.change(method, room.base + path, body);
     if (said === null) say('The dispatcher does not answer; check the change when it is back.', true);
     else if (said.ok) say(done);
     else say(`ERR ${said.code} ${said.text}`, true);
@@ -251,39 +251,34 @@
     return `${number} ${number === 1 ? one : many}`;
   }
 
+  const sayForced = head.alarm('forced', 'bad');
+
   function show(text) {
     state = JSON.parse(text);
+    const forced = state.clients.flatMap(({ name, channels }) => channels.filter((it) => it.forced !== null).map((it) => `${name}:${it.channel} to ${it.forced}`));
+    const further = forced.length > 3 ? ` and ${forced.length - 3} more` : '';
+    sayForced(forced.length ? `${count(forced.length, 'channel is', 'channels are')} forced: ${forced.slice(0, 3).join(', ')}${further}` : '');
     board.show(state);
     search();
     if (held && !board.pins.has(held.name)) endDrag();
     const asleep = state.connections.filter(({ awake }) => !awake).length;
     const waiting = asleep ? `, ${asleep} of them waiting` : '';
-    get('counts').textContent = `${count(state.clients.length, 'client', 'clients')}, ${count(state.connections.length, 'cable', 'cables')}${waiting}`;
+    head.count(`${count(state.clients.length, 'client', 'clients')}, ${count(state.connections.length, 'cable', 'cables')}${waiting}`);
     get('empty').hidden = state.clients.length > 0;
     showChosen();
   }
 
-  room.listen({
+  head.listen({
+    may: 'may change',
+    mayNot: 'Open the address that the dispatcher printed, with its token, to change something',
+    lost: 'No connection to the dispatcher.',
     news: show,
     access(isRight, refusal) {
       mayChange = isRight;
-      get('access').textContent = mayChange ? 'may change' : 'read-only';
-      get('access').classList.toggle('good', mayChange);
-      document.body.classList.toggle('read-only', !mayChange);
       const why = refusal || 'open the address that the dispatcher printed, with its token, to change something.';
       if (!mayChange) say(`Read-only: ${why}`);
       else if (get('status').textContent.startsWith('Read-only')) say('');
       showChosen();
-    },
-    age(isOld, seconds) {
-      document.body.classList.toggle('is-old', isOld);
-      const link = isOld ? 'no connection' : 'live';
-      if (get('link').textContent !== link) get('link').textContent = link;
-      get('link').className = isOld ? 'tag bad' : 'tag good';
-      get('age').hidden = !isOld;
-      if (!isOld) return;
-      const text = state ? `No connection to the dispatcher. What is shown is ${seconds} s old.` : 'No connection to the dispatcher.';
-      get('age').textContent = text;
     },
   });
 })();

@@ -118,7 +118,7 @@
       if (list.kind === "forced" || list.kind === "failsafe") list.choose();
       trend.collect();
       analyser.moved();
-      setLink();
+      head.showLink();
       redraw();
     },
   });
@@ -160,7 +160,6 @@
     say("");
     get("list").focus({ preventScroll: true });
   });
-  get("release-all").addEventListener("click", () => change("DELETE", "/force", undefined, "All signals are released."));
 
   window.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
@@ -202,16 +201,20 @@
     const kind = event.target.closest("button")?.dataset.kind;
     if (kind) choose(kind);
   });
-  for (const [id, kind] of [["show-forced", "forced"], ["show-failsafe", "failsafe"]]) {
-    get(id).addEventListener("click", () => {
-      get("filter").value = "";
-      list.filter("");
-      choose(kind);
-      get("signals").scrollIntoView({ block: "nearest" });
-    });
+  function showAll(kind) {
+    get("filter").value = "";
+    list.filter("");
+    choose(kind);
+    get("signals").scrollIntoView({ block: "nearest" });
   }
 
   // Events.
+
+  const sayForced = head.alarm("forced", "bad", [
+    ["show-forced", "Show", () => showAll("forced")],
+    ["release-all", "Release all", () => change("DELETE", "/force", undefined, "All signals are released.")],
+  ]);
+  const sayFailSafe = head.alarm("failsafe", "stale", [["show-failsafe", "Show", () => showAll("failsafe")]]);
 
   /** Alarms that nobody may overlook. */
   function alarm() {
@@ -226,16 +229,14 @@
         now.failSafe += 1;
       }
     }
-    get("forced").hidden = now.forced === 0;
     get("release-all").hidden = !mayForce;
     const further = now.forced > names.length ? ` and ${now.forced - names.length} more` : "";
-    write(get("forced-text"), `${words.count(now.forced, "signal is", "signals are")} forced: ${names.join(", ")}${further}`);
+    sayForced(now.forced ? `${words.count(now.forced, "signal is", "signals are")} forced: ${names.join(", ")}${further}` : "");
     const down = plant.drivers.filter(({ line }) => line && (line.status === "stale" || line.state !== "running"));
     const told = down.map((driver) => (plant.drivers.length > 1 ? `${driver.name}: ${driver.line.reason}` : driver.line.reason));
     const safe = now.failSafe ? `${words.count(now.failSafe, "signal has its", "signals have their")} fail-safe ${now.failSafe === 1 ? "value" : "values"}` : "";
-    get("failsafe").hidden = told.length === 0 && !safe;
     get("show-failsafe").hidden = now.failSafe === 0;
-    write(get("failsafe-text"), [safe, told.join("; ")].filter(Boolean).join(": "));
+    sayFailSafe([safe, told.join("; ")].filter(Boolean).join(": "));
     const isOther = now.forced !== counts.forced || now.failSafe !== counts.failSafe;
     counts = now;
     if (isOther && (list.kind === "forced" || list.kind === "failsafe")) list.choose();
@@ -243,9 +244,8 @@
 
   function renew() {
     const names = plant.drivers.map(({ name }) => name);
-    write(get("title"), names.join(" · ") || "tickbus");
-    document.title = `${names.join(" · ") || "No driver"} – tickbus`;
-    write(get("counts"), plant.drivers.length > 1 ? `${plant.drivers.length} drivers` : "");
+    head.title(names.join(" · ") || "tickbus", `${names.join(" · ") || "No driver"} – tickbus`);
+    head.count(plant.drivers.length > 1 ? `${plant.drivers.length} drivers` : "");
     // The variables of a run have no address and no direction, and cannot be forced.
     document.body.classList.toggle("only-runs", plant.drivers.length > 0 && plant.drivers.every((driver) => driver.isRun));
     document.body.classList.toggle("is-recording", isRecording());
@@ -274,13 +274,11 @@
     });
   }
 
-  /** Shows whether the page is live. */
-  function setLink() {
-    write(get("link"), isOld ? "no connection" : isRecording() ? "recording" : bar.moment ? "paused" : "live");
-    get("link").className = isOld ? "tag bad" : isRecording() ? "tag" : bar.moment ? "tag stale" : "tag good";
-  }
-
-  room.listen({
+  head.listen({
+    may: "may force",
+    mayNot: "Open the address that was printed, with its token, to force a signal",
+    lost: "No connection to the simulation.",
+    link: () => (isRecording() ? ["recording", ""] : bar.moment ? ["paused", "stale"] : null),
     news(text) {
       const { isOther, isLine } = plant.hear(text);
       if (isOther) renew();
@@ -289,23 +287,14 @@
     },
     access(isRight, refusal) {
       mayForce = isRight;
-      write(get("access"), mayForce ? "may force" : "read-only");
-      get("access").classList.toggle("good", mayForce);
-      document.body.classList.toggle("read-only", !mayForce);
-      if (mayForce) tabs.show();
       if (refusal) say(`Read-only: ${refusal}`);
       else if (get("status").textContent.startsWith("Read-only")) say("");
-      get("access").title = mayForce ? "Signals can be forced from this page" : "Open the address that was printed, with its token, to force a signal";
       redraw();
     },
-    age(isNowOld, seconds) {
+    age(isNowOld) {
       isOld = isNowOld;
       touch.link(isOld);
-      document.body.classList.toggle("is-old", isOld);
-      setLink();
-      get("age").hidden = !isOld;
-      if (isOld) write(get("age"), plant.signals.length ? `No connection to the simulation. What is shown is ${seconds} s old.` : "No connection to the simulation.");
-      else redraw();
+      if (!isOld) redraw();
     },
   });
 

@@ -379,7 +379,12 @@
   });
 
   let isDue = false;
-  room.listen({
+  head.listen({
+    // Its line is on the live page.
+    page: "/",
+    may: "may edit",
+    mayNot: "Open the address that was printed, with its token: without it the studio shows nothing",
+    lost: "No connection to the studio.",
     news(text) {
       const { isLine } = plant.hear(text);
       if (isLine) showLine();
@@ -392,9 +397,7 @@
     },
     async access(isRight, refusal) {
       mayEdit = isRight;
-      document.body.classList.toggle("read-only", !mayEdit);
       if (!isRight) return say(refusal || "Open the address that was printed, with its token: without it the studio shows nothing.", true);
-      tabs.show();
       if (!file) {
         const answer = await room.ask(`${running.base}/schema`, {});
         bus.begin(await answer.json(), { set });
@@ -402,9 +405,6 @@
       await read();
     },
     age(isOld) {
-      get("link").textContent = isOld ? "no connection" : "live";
-      get("link").className = isOld ? "tag bad" : "tag good";
-      document.body.classList.toggle("is-old", isOld);
       // Each event of the line comes here as well, up to 60 times a second.
       const now = performance.now();
       if (isOld || !file || cells.isEditing || document.hidden || now - asked < PAUSE) return;

@@ -9,11 +9,15 @@ const room = (() => {
   const LONGEST = 10000;
   /** The path of this page, which its own requests begin with; empty for the first page of the room. */
   const base = location.pathname.replace(/\/$/, "");
+  /** The page whose state is shown. */
+  let page = base || "/";
   let tell = {};
   /** The event source of this tab, and its token. */
   let mine = null;
   let isOpen = false;
   let heard = 0;
+  /** True after the first state. */
+  let isKnown = false;
 
   /** Takes the token from behind "#", which browsers never send, and removes it from the address at once. */
   function takeToken() {
@@ -52,26 +56,28 @@ const room = (() => {
 
   function setAge() {
     const now = performance.now();
-    tell.age(now - heard > PATIENCE || !isOpen, Math.round((now - heard) / 1000));
+    tell.age(now - heard > PATIENCE || !isOpen, Math.round((now - heard) / 1000), isKnown);
   }
 
-  /** Handles one server-sent event. */
-  function hear(event) {
-    heard = performance.now();
-    const data = /^data: ?([^\n]*)$/m.exec(event);
-    try {
-      if (data && !event.startsWith("event: beat")) tell.news(data[1]);
-    } catch (error) {
-      // A defect of the page does not end the connection.
-      reportError(error);
+  function take(message) {
+    if (message.isOpen !== undefined) {
+      isOpen = message.isOpen;
+      if (isOpen) askAccess();
+    } else if (message.tabs) {
+      tell.tabs?.(message.tabs);
+      return;
+    } else if (message.page === page) {
+      heard = performance.now();
+      try {
+        if (message.data) {
+          isKnown = true;
+          tell.news(message.data);
+        }
+      } catch (error) {
+        // A defect of the page does not end the connection.
+        reportError(error);
+      }
     }
-    setAge();
-  }
-
-  function take({ event, isOpen: isNowOpen }) {
-    if (event !== undefined) return hear(event);
-    isOpen = isNowOpen;
-    if (isOpen) askAccess();
     setAge();
   }
 
@@ -81,11 +87,11 @@ const room = (() => {
     if (!window.SharedWorker) {
       const own = stream(token, takeOwn);
       // A hidden tab frees its connection for other tabs, unless it has a token and may have forced something.
-      return { look: own.connect, rest: () => { if (!token) own.stop(); }, leave: own.stop };
+      return { look: () => own.connect([page]), rest: () => (token ? own.connect([]) : own.stop()), leave: own.stop };
     }
     const { port } = new SharedWorker("/stream.js", { name: token });
     port.onmessage = ({ data }) => takeOwn(data);
-    return { look: () => port.postMessage("look"), rest: () => port.postMessage("rest"), leave: () => port.postMessage("leave") };
+    return { look: () => port.postMessage({ look: page }), rest: () => port.postMessage({}), leave: () => port.postMessage("leave") };
   }
 
   function connect() {
@@ -100,11 +106,13 @@ const room = (() => {
   }
 
   /**
-   * Listens forever. `news` gets each event as text; `access` whether changes are allowed and, if a token was refused, why;
-   * `age` twice a second whether the displayed state is old, and by how many seconds.
+   * Listens forever. `news` gets each state as text, of this page or of `page`; `tabs` the list of the room's tabs, as text;
+   * `access` whether changes are allowed and, if a token was refused, why;
+   * `age` twice a second whether the displayed state is old, by how many seconds, and if there is any.
    */
   function listen(listener) {
     tell = listener;
+    page = listener.page ?? page;
     takeToken();
     // A new token in the address of this tab does not reload the page.
     window.addEventListener("hashchange", () => {

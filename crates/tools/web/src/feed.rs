@@ -1,4 +1,4 @@
-//! The newest state, for all viewers.
+//! The newest state of a page, for all its viewers.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -9,8 +9,7 @@ use tickbus_base::time::{Clock, Nanos};
 use tokio::sync::{Notify, watch};
 use tokio::time::timeout;
 
-use crate::pages::Pages;
-use crate::site::{Answer, Differences, State};
+use crate::site::{Answer, Differences, Site, State};
 
 /// The shortest time between two looks.
 const PERIOD: Duration = Duration::from_micros(16_667);
@@ -27,9 +26,8 @@ const KEPT: usize = 4;
 
 /// The newest state. Slow viewers miss the states in between, and delay nobody.
 pub(crate) struct Feed {
+    site: Arc<dyn Site>,
     state: watch::Sender<Newest>,
-    /// A viewer has come.
-    wanted: Notify,
     /// Changes so far.
     changes: AtomicU64,
     /// There was a change: cut the pause short.
@@ -51,6 +49,7 @@ struct Formatted {
 
 /// A viewer.
 pub(crate) struct Viewer {
+    feed: Arc<Feed>,
     newest: watch::Receiver<Newest>,
     /// The changes before the viewer came: it gets no state from before them.
     changes: u64,
@@ -69,7 +68,7 @@ enum Seen {
 
 /// The last state that was looked at.
 enum Newest {
-    /// There are no viewers.
+    /// There was no look yet.
     Unknown,
     State(Published),
     /// The site has ended.
@@ -122,10 +121,10 @@ pub(crate) fn json(event: &Bytes) -> Bytes {
 }
 
 impl Feed {
-    pub(crate) fn new(clock: Arc<dyn Clock>) -> Self {
+    pub(crate) fn new(site: Arc<dyn Site>, clock: Arc<dyn Clock>) -> Self {
         Self {
+            site,
             state: watch::Sender::new(Newest::Unknown),
-            wanted: Notify::new(),
             changes: AtomicU64::new(0),
             hurry: Notify::new(),
             looks: AtomicU64::new(0),
@@ -135,48 +134,33 @@ impl Feed {
     }
 
     /// Adds a viewer.
-    pub(crate) fn subscribe(&self) -> Viewer {
+    pub(crate) fn subscribe(self: &Arc<Self>) -> Viewer {
         let mut newest = self.state.subscribe();
         newest.mark_changed();
-        self.wanted.notify_one();
-        let changes = self.changes.load(Ordering::Relaxed);
         Viewer {
+            feed: Arc::clone(self),
             newest,
-            changes,
+            changes: self.changes.load(Ordering::Relaxed),
             seen: Seen::Nothing,
         }
     }
 
-    /// The next event for a viewer: the newest state, or its differences from the viewer's last one. `None`: the site
-    /// has ended.
-    pub(crate) async fn next(&self, viewer: &mut Viewer) -> Option<Bytes> {
-        loop {
-            viewer.newest.changed().await.ok()?;
-            let content = match &*viewer.newest.borrow_and_update() {
-                Newest::State(state) if state.changes >= viewer.changes => state.content.clone(),
-                Newest::State(_) | Newest::Unknown => continue,
-                Newest::Ended => return None,
-            };
-            match content {
-                Content::Whole(event) => {
-                    if !matches!(&viewer.seen, Seen::Whole(seen) if *seen == event) {
-                        viewer.seen = Seen::Whole(event.clone());
-                        return Some(event);
-                    }
-                }
-                Content::Differences { state, .. } => {
-                    let seen = match viewer.seen {
-                        Seen::State(number) => Some(number),
-                        Seen::Nothing | Seen::Whole(_) => None,
-                    };
-                    if seen != Some(state.number()) {
-                        let (number, event) = self.differences(&*state, seen);
-                        viewer.seen = Seen::State(number);
-                        return Some(event);
-                    }
-                }
-            }
-        }
+    pub(crate) fn has_viewers(&self) -> bool {
+        self.state.receiver_count() > 0
+    }
+
+    pub(crate) fn is_of(&self, site: &Arc<dyn Site>) -> bool {
+        Arc::ptr_eq(&self.site, site)
+    }
+
+    /// True after the site gave no answer.
+    pub(crate) fn has_ended(&self) -> bool {
+        matches!(*self.state.borrow(), Newest::Ended)
+    }
+
+    /// Ends the streams of all viewers.
+    pub(crate) fn end(&self) {
+        self.state.send_replace(Newest::Ended);
     }
 
     /// The event for a viewer who has seen this state. Most viewers have seen the same one, and share the event.
@@ -215,60 +199,83 @@ impl Feed {
         self.hurry.notify_one();
     }
 
+    /// Looks at the site once, and rests.
+    pub(crate) async fn look(&self) {
+        let changes = self.changes.load(Ordering::Relaxed);
+        let asked = self.clock.now();
+        let (answer, state) = Answer::new();
+        self.site.look(answer);
+        let Ok(state) = state.await else {
+            return self.end();
+        };
+        // The time for the site's answer was not this thread's work, and needs no rest.
+        let begin = self.clock.now();
+        let content = match state {
+            State::Whole(make) => Content::Whole(event(&make())),
+            State::Differences(state) => Content::Differences {
+                number: state.number(),
+                state,
+            },
+        };
+        // Includes the formatting for single viewers since the last look.
+        let spent = std::mem::take(&mut self.formatted().spent);
+        let taken = self.clock.now() - begin + spent;
+        let taken = u64::try_from(taken.0).unwrap_or_default();
+        self.looks.fetch_add(1, Ordering::Relaxed);
+        let state = Published { content, changes };
+        self.state.send_if_modified(|present| {
+            let is_new = match present {
+                Newest::State(present) => state.is_new(present),
+                Newest::Unknown | Newest::Ended => true,
+            };
+            *present = Newest::State(state);
+            is_new
+        });
+        let rest = Duration::from_nanos(taken).saturating_mul(REST);
+        let rest = rest.min(LONGEST_REST).saturating_sub(PERIOD);
+        // The time for the site's answer is part of the period.
+        let passed = (self.clock.now() - asked).to_duration();
+        tokio::time::sleep(PERIOD.saturating_sub(passed)).await;
+        if !rest.is_zero() {
+            // A change during the look is remembered, and is looked at just as soon.
+            let _ = timeout(rest, self.hurry.notified()).await;
+        }
+    }
+}
+
+impl Viewer {
     /// The number of answered looks. While it does not grow, the page may be outdated.
     pub(crate) fn looks(&self) -> u64 {
-        self.looks.load(Ordering::Relaxed)
+        self.feed.looks.load(Ordering::Relaxed)
     }
 
-    /// Looks at the site while there are viewers, until the site has ended.
-    pub(crate) async fn run(&self, pages: &Pages) {
+    /// The next event: the newest state, or its differences from the viewer's last one. `None`: the page has ended.
+    pub(crate) async fn next(&mut self) -> Option<Bytes> {
         loop {
-            while self.state.receiver_count() == 0 {
-                // The state may be outdated when the next viewer comes.
-                self.state.send_replace(Newest::Unknown);
-                self.wanted.notified().await;
-            }
-            let changes = self.changes.load(Ordering::Relaxed);
-            let asked = self.clock.now();
-            let (answer, state) = Answer::new();
-            if let Some((site, _)) = pages.page_of("/") {
-                site.look(answer);
-            }
-            let Ok(state) = state.await else {
-                self.state.send_replace(Newest::Ended);
-                return;
+            self.newest.changed().await.ok()?;
+            let content = match &*self.newest.borrow_and_update() {
+                Newest::State(state) if state.changes >= self.changes => state.content.clone(),
+                Newest::State(_) | Newest::Unknown => continue,
+                Newest::Ended => return None,
             };
-            // The time for the site's answer was not this thread's work, and needs no rest.
-            let begin = self.clock.now();
-            let content = match state {
-                State::Whole(make) => Content::Whole(event(&make())),
-                State::Differences(state) => Content::Differences {
-                    number: state.number(),
-                    state,
-                },
-            };
-            // Includes the formatting for single viewers since the last look.
-            let spent = std::mem::take(&mut self.formatted().spent);
-            let taken = self.clock.now() - begin + spent;
-            let taken = u64::try_from(taken.0).unwrap_or_default();
-            self.looks.fetch_add(1, Ordering::Relaxed);
-            let state = Published { content, changes };
-            self.state.send_if_modified(|present| {
-                let is_new = match present {
-                    Newest::State(present) => state.is_new(present),
-                    Newest::Unknown | Newest::Ended => true,
-                };
-                *present = Newest::State(state);
-                is_new
-            });
-            let rest = Duration::from_nanos(taken).saturating_mul(REST);
-            let rest = rest.min(LONGEST_REST).saturating_sub(PERIOD);
-            // The time for the site's answer is part of the period.
-            let passed = (self.clock.now() - asked).to_duration();
-            tokio::time::sleep(PERIOD.saturating_sub(passed)).await;
-            if !rest.is_zero() {
-                // A change during the look is remembered, and is looked at just as soon.
-                let _ = timeout(rest, self.hurry.notified()).await;
+            match content {
+                Content::Whole(event) => {
+                    if !matches!(&self.seen, Seen::Whole(seen) if *seen == event) {
+                        self.seen = Seen::Whole(event.clone());
+                        return Some(event);
+                    }
+                }
+                Content::Differences { state, .. } => {
+                    let seen = match self.seen {
+                        Seen::State(number) => Some(number),
+                        Seen::Nothing | Seen::Whole(_) => None,
+                    };
+                    if seen != Some(state.number()) {
+                        let (number, event) = self.feed.differences(&*state, seen);
+                        self.seen = Seen::State(number);
+                        return Some(event);
+                    }
+                }
             }
         }
     }

@@ -7,7 +7,9 @@
 //! The room uses hyper, not the framework axum on top of it: axum's own server limits neither the time for headers nor
 //! the number of connections, and a page has so few paths that a `match` suffices as their router.
 
+mod events;
 mod feed;
+mod feeds;
 mod guard;
 mod pages;
 mod patient;
@@ -29,9 +31,9 @@ pub const CLIENT: &str = include_str!("client.js");
 /// The script that reads the events, as a worker for all tabs of a browser; `client.js` expects it at `/stream.js`.
 pub const STREAM: &str = include_str!("stream.js");
 
-/// The script that shows the pages of a room as tabs, in the element `tabs` of each page; it asks for `/tabs`, a list of
-/// paths and names.
-pub const TABS: &str = include_str!("tabs.js");
+/// The script of the head that all pages of a room have: title, tabs, connection, access, counts and alarms, which it makes in
+/// the element `top`. A page has `stream.js`, `client.js` and this before its own script, and calls `head.listen`.
+pub const HEAD: &str = include_str!("head.js");
 
-/// The style of these tabs.
-pub const TABS_STYLE: &str = include_str!("tabs.css");
+/// The style of that head; it follows `report.css`, which has the colours.
+pub const STYLE: &str = include_str!("room.css");

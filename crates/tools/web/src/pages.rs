@@ -26,7 +26,7 @@ use crate::site::{Answer, Asset, Change, Document, Outcome, Site, Tab};
 /// | `GET /board` | the asset `/` |
 /// | `GET /board/x` | the asset `/x`, or [`get`](Site::get) of `/x` |
 /// | `PUT`, `DELETE /board/x` | [`change`](Site::change) of `/x` |
-/// | `GET /board/state` | [`look`](Site::look) |
+/// | `GET /board/state`, `/board/events`, `/events?page=/board` | [`look`](Site::look), while somebody asks |
 /// | `GET /x` | the asset `/x`, if the first page and the pages before it have none of that path |
 ///
 /// The HTML can therefore name its scripts and styles as `/x.js`, whatever its path is; no two pages have different
@@ -162,6 +162,12 @@ impl Pages {
             .or_else(kinds)
             .or(own);
         found.map(|(entry, rest)| (Arc::clone(&entry.site), rest.to_owned()))
+    }
+
+    /// The page at exactly this path.
+    pub(crate) fn page_at(&self, path: &str) -> Option<Arc<dyn Site>> {
+        let (site, rest) = self.page_of(path)?;
+        (rest == "/").then_some(site)
     }
 
     /// The file for a path: of its page, or of any.

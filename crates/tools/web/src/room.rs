@@ -17,7 +17,7 @@ use tickbus_net::{Address, bind, prepare};
 use tokio::net::TcpStream;
 use tokio::sync::oneshot;
 
-use crate::feed::Feed;
+use crate::feeds::Feeds;
 use crate::guard::Guard;
 use crate::pages::Pages;
 use crate::patient::Patient;
@@ -135,16 +135,15 @@ impl Room {
             .spawn(move || {
                 let limits = self.limits;
                 let hall = Arc::new(Hall {
-                    pages,
                     guard: self.guard,
-                    feed: Feed::new(clock),
+                    feeds: Feeds::new(pages.clone(), clock),
+                    pages,
                     patience: limits.patience,
                     holders: AtomicUsize::new(0),
                 });
                 runtime.block_on(async {
                     tokio::select! {
                         () = accept(self.listener, &hall, limits) => {}
-                        () = async { hall.feed.run(&hall.pages).await; std::future::pending().await } => {}
                         _ = stopped => {}
                     }
                 });

@@ -5,25 +5,23 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
-use futures_util::stream::unfold;
+use futures_util::{Stream, StreamExt as _};
 use http_body_util::combinators::UnsyncBoxBody;
 use http_body_util::{BodyExt as _, Full, Limited, StreamBody};
-use hyper::body::{Bytes, Frame, Incoming};
+use hyper::body::{Bytes, Incoming};
 use hyper::header::{
     ALLOW, CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, HeaderName, HeaderValue,
     REFERRER_POLICY, X_CONTENT_TYPE_OPTIONS,
 };
 use hyper::{Method, Request, Response, StatusCode};
-use tokio::time::{Interval, interval, timeout};
+use tokio::time::timeout;
 
-use crate::feed::{Feed, Viewer, json};
+use crate::events;
+use crate::feed::json;
+use crate::feeds::Feeds;
 use crate::guard::{Guard, Token};
 use crate::pages::Pages;
 use crate::site::{Answer, Change, Verb};
-
-/// A viewer gets a message at least this often while the site answers; a page without messages knows that its contents
-/// are outdated.
-const BEAT: Duration = Duration::from_secs(1);
 
 /// Only the page and its own files; nothing from other hosts, nothing inline, not within a frame.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data:; \
@@ -35,7 +33,7 @@ const JSON: &str = "application/json";
 pub(crate) struct Hall {
     pub(crate) pages: Pages,
     pub(crate) guard: Guard,
-    pub(crate) feed: Feed,
+    pub(crate) feeds: Arc<Feeds>,
     pub(crate) patience: Duration,
     /// The number of viewers with the token.
     pub(crate) holders: AtomicUsize,
@@ -116,7 +114,7 @@ async fn respond(hall: &Arc<Hall>, request: Request<Incoming>) -> Result<Respons
     }
     let path = request.uri().path().to_owned();
     let verb = match *request.method() {
-        Method::GET => return get(hall, &path, token).await,
+        Method::GET => return get(hall, &path, request.uri().query(), token).await,
         Method::PUT => Verb::Put,
         Method::DELETE => Verb::Delete,
         _ => {
@@ -138,7 +136,7 @@ async fn respond(hall: &Arc<Hall>, request: Request<Incoming>) -> Result<Respons
         .err()
         .is_none_or(|refused| refused.status >= 500)
     {
-        hall.feed.changed();
+        hall.feeds.changed();
     }
     outcome.map_err(|refused| {
         let status = StatusCode::from_u16(refused.status);
@@ -150,15 +148,32 @@ async fn respond(hall: &Arc<Hall>, request: Request<Incoming>) -> Result<Respons
     Ok(full(JSON, "{\"code\":200,\"text\":\"done\"}\n".to_owned()))
 }
 
-async fn get(hall: &Arc<Hall>, path: &str, token: Token) -> Result<Response<Body>, Refusal> {
+async fn get(
+    hall: &Arc<Hall>,
+    path: &str,
+    query: Option<&str>,
+    token: Token,
+) -> Result<Response<Body>, Refusal> {
+    let holder = || (token == Token::Right).then(|| Holder::new(hall));
+    if let Some(query) = query.filter(|_| path == "/events") {
+        let pages = events::asked(query).map_err(|text| (StatusCode::BAD_REQUEST, text))?;
+        return Ok(stream(events::of_pages(hall, pages), holder()));
+    }
+    // The state of the page at what is before the end of the path.
+    let viewer = |end: &str| {
+        let page = path.strip_suffix(end)?;
+        hall.feeds
+            .subscribe(if page.is_empty() { "/" } else { page })
+    };
+    if let Some(mut viewer) = viewer("/state") {
+        let state = timeout(hall.patience, viewer.next()).await;
+        let state = state.map_err(|_| hung())?;
+        return Ok(full(JSON, json(&state.ok_or_else(nobody)?)));
+    }
+    if let Some(viewer) = viewer("/events") {
+        return Ok(stream(events::of_page(viewer), holder()));
+    }
     match path {
-        "/state" => {
-            let mut viewer = hall.feed.subscribe();
-            let state = timeout(hall.patience, hall.feed.next(&mut viewer)).await;
-            let state = state.map_err(|_| hung())?;
-            Ok(full(JSON, json(&state.ok_or_else(nobody)?)))
-        }
-        "/events" => Ok(events(hall, token)),
         "/tabs" => Ok(full(JSON, hall.pages.tabs().to_string())),
         "/access" if token == Token::Wrong => Err(no_token(token)),
         "/access" => Ok(full(
@@ -183,52 +198,15 @@ async fn get(hall: &Arc<Hall>, path: &str, token: Token) -> Result<Response<Body
     }
 }
 
-/// The newest state, whenever it has changed and the viewer has taken the last one.
-fn events(hall: &Arc<Hall>, token: Token) -> Response<Body> {
-    let mut events = Events {
-        hall: Arc::clone(hall),
-        _holder: (token == Token::Right).then(|| Holder::new(hall)),
-        viewer: hall.feed.subscribe(),
-        looks: 0,
-        beat: interval(BEAT),
-    };
-    events.beat.reset();
-    let stream = unfold(events, |mut events| async {
-        let event = events.next().await?;
-        Some((Ok(Frame::data(event)), events))
+/// The answer that lasts; its viewer counts as present if it has the token.
+fn stream(
+    events: impl Stream<Item = events::Sent> + Send + 'static,
+    holder: Option<Holder>,
+) -> Response<Body> {
+    let events = events.inspect(move |_| {
+        let _ = &holder;
     });
-    respond_with("text/event-stream", StreamBody::new(stream).boxed_unsync())
-}
-
-/// The events for one viewer.
-struct Events {
-    hall: Arc<Hall>,
-    _holder: Option<Holder>,
-    viewer: Viewer,
-    /// The number of answered looks at the last event.
-    looks: u64,
-    /// When the viewer gets an event even for the same state.
-    beat: Interval,
-}
-
-impl Events {
-    async fn next(&mut self) -> Option<Bytes> {
-        let event = loop {
-            tokio::select! {
-                biased;
-                event = self.hall.feed.next(&mut self.viewer) => break event?,
-                // This thread lives, but does the site? If it has answered no look since, the viewer has to know.
-                _ = self.beat.tick() => {
-                    if self.hall.feed.looks() != self.looks {
-                        break Bytes::from_static(b"event: beat\ndata:\n\n");
-                    }
-                }
-            }
-        };
-        self.looks = self.hall.feed.looks();
-        self.beat.reset();
-        Some(event)
-    }
+    respond_with("text/event-stream", StreamBody::new(events).boxed_unsync())
 }
 
 async fn body(hall: &Hall, request: Request<Incoming>, longest: usize) -> Result<String, Refusal> {

@@ -11,7 +11,7 @@ use std::time::Duration;
 use tickbus_base::time::{Manual, Nanos};
 use tickbus_net::Address;
 use tickbus_web::{
-    Answer, Asset, Change, Limits, Outcome, Pages, Refused, Room, Serving, Site, State, Verb,
+    Answer, Asset, Change, Limits, Outcome, Page, Pages, Refused, Room, Serving, Site, State, Verb,
 };
 
 /// A page with one text that can be changed.
@@ -87,6 +87,7 @@ struct Fixture {
     toy: Arc<Toy>,
     address: SocketAddr,
     token: String,
+    pages: Pages,
     _serving: Serving,
 }
 
@@ -98,11 +99,13 @@ fn serve(limits: Limits) -> Fixture {
     let toy = Arc::new(Toy::default());
     let site: Arc<Toy> = Arc::clone(&toy);
     let clock = Arc::clone(&toy.clock);
-    let serving = room.serve(Pages::of("Toy", site), clock).expect("a thread");
+    let pages = Pages::of("Toy", site);
+    let serving = room.serve(pages.clone(), clock).expect("a thread");
     Fixture {
         toy,
         address,
         token,
+        pages,
         _serving: serving,
     }
 }
@@ -141,10 +144,14 @@ impl Fixture {
     }
 
     fn view(&self) -> Viewer {
+        self.view_at("/events")
+    }
+
+    fn view_at(&self, path: &str) -> Viewer {
         let mut stream = self.connect();
         write!(
             stream,
-            "GET /events HTTP/1.1\r\nHost: {}\r\n\r\n",
+            "GET {path} HTTP/1.1\r\nHost: {}\r\n\r\n",
             self.address
         )
         .expect("it reads");
@@ -171,7 +178,14 @@ impl Viewer {
         line
     }
 
-    /// The next state.
+    /// The next event of this name.
+    fn event(&mut self, name: &str) -> String {
+        let name = format!("event: {name}\n");
+        while self.line() != name {}
+        self.state()
+    }
+
+    /// The next state, or the data of an event.
     fn state(&mut self) -> String {
         loop {
             let line = self.line();
@@ -321,6 +335,67 @@ fn a_viewer_hears_the_newest_state_and_a_beat_without_one() {
     fixture.put("one");
     assert_eq!(viewer.state(), "\"one\"");
     while viewer.line() != "event: beat\n" {}
+}
+
+#[test]
+fn one_stream_has_the_pages_that_it_is_asked_for_and_the_tabs() {
+    let fixture = serve(Limits::default());
+    let board = Arc::new(Toy::default());
+    let joined = fixture
+        .pages
+        .join(Page::new("Board", "/board", Arc::clone(&board) as _));
+    let mut viewer = fixture.view_at("/events?page=%2Fboard&page=/later");
+    assert_eq!(
+        viewer.event("tabs"),
+        "[{\"name\":\"Toy\",\"path\":\"/\"},{\"name\":\"Board\",\"path\":\"/board\"}]"
+    );
+    assert_eq!(viewer.event("/board"), "\"\"");
+    let right = format!("Authorization: Bearer {}\r\n", fixture.token);
+    assert_status(&fixture.ask("PUT /board/text", &right, "patched"), 200);
+    assert_eq!(viewer.event("/board"), "\"patched\"");
+    assert!(
+        fixture
+            .ask("GET /board/state", "", "")
+            .ends_with("\r\n\"patched\"")
+    );
+    assert_eq!(fixture.view_at("/board/events").state(), "\"patched\"");
+    // Nobody looks at the first page.
+    assert_eq!(fixture.toy.looks.load(Ordering::SeqCst), 0);
+    while viewer.event("beat") != "/board" {}
+
+    let later = Arc::new(Toy::default());
+    *later.text.lock().expect("no panic") = "here".to_owned();
+    let _later = fixture.pages.join(Page::new("Later", "/later", later));
+    assert_eq!(viewer.event("/later"), "\"here\"");
+    drop(joined);
+    // Another page at the same path is another one.
+    let other = Page::new("Board", "/board", Arc::new(Toy::default()));
+    let _other = fixture.pages.join(other);
+    assert_eq!(viewer.event("/board"), "\"\"");
+}
+
+#[test]
+fn a_stream_without_pages_has_a_beat_and_asks_no_page() {
+    let fixture = serve(Limits::default());
+    let mut viewer = fixture.view_at("/events?page=");
+    assert_eq!(viewer.event("beat"), "");
+    assert_eq!(fixture.toy.looks.load(Ordering::SeqCst), 0);
+}
+
+#[test]
+fn a_wrong_list_of_pages_is_refused() {
+    let fixture = serve(Limits::default());
+    for query in ["pages=/", "page=%0Adata:", ""] {
+        let answer = fixture.ask(&format!("GET /events?{query}"), "", "");
+        assert_status(&answer, 400);
+    }
+    let many: Vec<_> = (0..33).map(|page| format!("page=/{page}")).collect();
+    let answer = fixture.ask(&format!("GET /events?{}", many.join("&")), "", "");
+    assert_status(&answer, 400);
+    assert!(answer.contains("at most 32 pages"), "{answer}");
+    let right = format!("Authorization: Bearer {}\r\n", fixture.token);
+    let answer = fixture.ask("PUT /board/text", &right, "x");
+    assert_status(&answer, 409);
 }
 
 /// An hour.

@@ -235,6 +235,13 @@ impl Instance {
                 _ => to,
             });
         }
+        if config.page.is_some() {
+            log::warn!(
+                "driver \"{}\": its driver.cfg asks for a live page, and an FMU has none, because the importing tool unpacks it into \
+                 a folder that has no picture and is removed; remove [page], or open the driver from C, Java or Python",
+                config.name
+            );
+        }
         let driver = Driver::open(config, Monotonic::shared()).map_err(|why| why.to_string())?;
         self.driver = Some(driver);
         self.phase = match self.event_mode {

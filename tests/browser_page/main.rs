@@ -14,6 +14,7 @@ mod commands;
 #[path = "../peers/edited.rs"]
 mod edited;
 mod live;
+mod room;
 mod run;
 mod show;
 mod studio;

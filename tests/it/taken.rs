@@ -99,7 +99,10 @@ fn without_edit_a_page_has_no_studio() {
     for path in ["/studio/edit", "/studio/line", "/studio/of/7/line"] {
         assert_eq!(machine.ask(&format!("PUT {path}"), "take").0, 404, "{path}");
     }
-    assert_eq!(machine.get("/tabs"), json!([]));
+    assert_eq!(
+        machine.get("/tabs"),
+        json!([{ "name": "Live page", "path": "/" }])
+    );
 }
 
 #[test]

@@ -19,12 +19,13 @@ const room = (() => {
   /** True after the first state. */
   let isKnown = false;
 
-  /** Takes the token from behind "#", which browsers never send, and removes it from the address at once. */
+  /** Takes the token from behind "#", which browsers never send, and removes it from the address at once; true if there was one. */
   function takeToken() {
     const given = /^#token=([0-9a-f]+)$/.exec(location.hash);
-    if (!given) return;
+    if (!given) return false;
     sessionStorage.setItem("token", given[1]);
     history.replaceState(null, "", location.pathname + location.search);
+    return true;
   }
 
   function headers() {
@@ -116,8 +117,7 @@ const room = (() => {
     takeToken();
     // A new token in the address of this tab does not reload the page.
     window.addEventListener("hashchange", () => {
-      takeToken();
-      connect();
+      if (takeToken()) connect();
     });
     document.addEventListener("visibilitychange", connect);
     window.addEventListener("pagehide", () => {

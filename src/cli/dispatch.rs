@@ -111,19 +111,36 @@ fn join(
     Ok(joined.post)
 }
 
+/// The patch bay with the layout that is kept beside the patch.
+#[cfg(feature = "page")]
+fn patch_bay(patch: &std::path::Path, door: &Door) -> Result<tickbus_patch_bay::PatchBay, Outcome> {
+    use tickbus_patch_bay::{LayoutRefused, PatchBay};
+
+    let layout = PatchBay::layout_beside(patch);
+    PatchBay::with_layout(door.clone(), &layout, |told| say(&told)).map_err(|refused| match refused {
+        LayoutRefused::Mistakes(mistakes) => {
+            eprintln!("{mistakes}\ndispatch: failed mistakes={}", mistakes.len());
+            Outcome::WrongInput
+        }
+        LayoutRefused::System(error) => {
+            say(&format!("failed reason=\"the layout cannot be kept: {error}\""));
+            Outcome::BusFailed
+        }
+    })
+}
+
 /// Serves the patch bay and prints its address.
 #[cfg(feature = "page")]
 fn serve_page(
     address: &Address,
     token_file: Option<&std::path::Path>,
-    door: &Door,
+    site: tickbus_patch_bay::PatchBay,
 ) -> io::Result<tickbus_web::Serving> {
     let mut room = tickbus_web::Room::bind(address, tickbus_web::Limits::default())?;
     if let Some(file) = token_file {
         room.keep_token(file)?;
     }
     say(&format!("page at {}", room.url()));
-    let site = tickbus_patch_bay::PatchBay::new(door.clone());
     let pages = tickbus_web::Pages::of("Patch bay", std::sync::Arc::new(site));
     room.serve(pages, Monotonic::shared())
 }
@@ -198,15 +215,21 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
     #[cfg(feature = "page")]
     let _serving = match &arguments.page {
         None => None,
-        Some(address) => match serve_page(address, arguments.page_token_file.as_deref(), &door) {
-            Ok(serving) => Some(serving),
-            Err(error) => {
-                return failed(format!(
-                    "the page cannot be served on {address} ({error}); end the program that has this port, or give \
-                     another --page"
-                ));
+        Some(address) => {
+            let site = match patch_bay(&arguments.patch, &door) {
+                Ok(site) => site,
+                Err(outcome) => return outcome,
+            };
+            match serve_page(address, arguments.page_token_file.as_deref(), site) {
+                Ok(serving) => Some(serving),
+                Err(error) => {
+                    return failed(format!(
+                        "the page cannot be served on {address} ({error}); end the program that has this port, or give \
+                         another --page"
+                    ));
+                }
             }
-        },
+        }
     };
     let hosting = Hosting {
         clock: &*Monotonic::shared(),

@@ -13,6 +13,7 @@ mod webdriver;
 mod commands;
 #[path = "../peers/edited.rs"]
 mod edited;
+mod board;
 mod live;
 mod room;
 mod run;
@@ -291,17 +292,24 @@ fn everything_is_done_from_the_keyboard_and_announced() {
     wait_value(&browser, "PUMP:Q1", "24");
     browser.run("document.activeElement.blur()");
     browser.keys(TAB);
-    assert_eq!(browser.run("return document.activeElement.id"), "search");
+    assert_eq!(browser.run("return document.activeElement.id"), "as-boxes");
+    browser.run("document.getElementById('search').focus()");
+    browser.keys(TAB);
+    assert_eq!(
+        browser.run("return document.activeElement.textContent"),
+        "PUMP"
+    );
     browser.keys(TAB);
     assert_eq!(
         browser.run("return document.activeElement.getAttribute('aria-label')"),
-        "PUMP:Q1 digital output, 24"
+        "Q1 24, digital output of PUMP"
     );
     browser.keys(ENTER);
     wait_said(
         &browser,
         "PUMP:Q1 is chosen. Choose an input to connect it.",
     );
+    browser.keys(TAB);
     browser.keys(TAB);
     browser.keys(ENTER);
     wait_said(&browser, "Connected PUMP:Q1 with LOGO:I1.");
@@ -547,9 +555,10 @@ fn channels_are_found_by_what_their_client_calls_them() {
     seen("", 6);
     find("LEVEL adam");
     seen("1 channel", 1);
-    browser.run(
-        "document.getElementById('search').dispatchEvent(new KeyboardEvent('keydown', { key: 'Enter' })); return null",
-    );
+    browser.run("document.getElementById('search').focus()");
+    browser.keys("\u{e007}");
+    seen("1 of 1: ADAM:AQ1 Level <b>\"A\"</b>", 1);
+    browser.keys("\u{e015}");
     browser.wait("document.activeElement.dataset.pin === 'ADAM:AQ1'");
     find("i1");
     seen("1 channel", 1);

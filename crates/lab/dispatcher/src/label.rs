@@ -18,6 +18,11 @@ impl Label {
         (is_right && !text.contains(is_unfit)).then(|| Self(text.into()))
     }
 
+    /// The label `text`; blanks at its ends do not count. `None` if it is none.
+    pub fn read_text(text: &str) -> Option<Self> {
+        Self::read(text.as_bytes())
+    }
+
     /// The label that shows `name`, shortened if necessary, with blanks for control characters. `None` if nothing is left.
     pub fn of(name: &str) -> Option<Self> {
         let text: String = name

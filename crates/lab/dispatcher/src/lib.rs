@@ -47,7 +47,7 @@ pub use label::{LONGEST_LABEL, Label};
 pub use name::{LONGEST_NAME, is_name};
 pub use number::{LONGEST_NUMBER, Number};
 pub use patch::{Patch, Pin};
-pub use patch_file::PatchFile;
+pub use patch_file::{PatchFile, replace_file};
 pub use post::Post;
 pub use refusal::{Code, Refusal};
 pub use volts::{ON_VOLTS, level};

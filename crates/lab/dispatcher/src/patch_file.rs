@@ -20,19 +20,13 @@ const HEADING: &str = "\
 #[derive(Clone, Debug)]
 pub struct PatchFile {
     path: PathBuf,
-    /// Where the next version is written, in the same folder.
-    next: PathBuf,
 }
 
 impl PatchFile {
     /// The file at `path`.
     pub fn new(path: &Path) -> Self {
-        let mut next = path.as_os_str().to_owned();
-        next.push(".new");
-        Self {
-            path: path.to_owned(),
-            next: next.into(),
-        }
+        let path = path.to_owned();
+        Self { path }
     }
 
     /// Reads the patch; a file that does not exist has none.
@@ -61,23 +55,37 @@ impl PatchFile {
             // Writing to a String cannot fail.
             let _ = writeln!(text, "\"{sink}\" = \"{source}\"");
         }
-        // In a shared folder the name may be another user's link, which must not be followed.
-        match fs::remove_file(&self.next) {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
-            _ => {}
-        }
-        let mut file = File::create_new(&self.next)?;
-        file.write_all(text.as_bytes())?;
-        file.sync_all()?;
-        drop(file);
-        fs::rename(&self.next, &self.path)?;
-        #[cfg(unix)]
-        {
-            let folder = self.path.parent().filter(|it| !it.as_os_str().is_empty());
-            File::open(folder.unwrap_or(Path::new(".")))?.sync_all()?;
-        }
-        Ok(())
+        replace_file(&self.path, &text)
     }
+}
+
+/// Replaces a file by one with this text. On return the text is safe, even if the computer crashes; at every moment the
+/// file has either the old text or the new one.
+///
+/// # Errors
+///
+/// The file cannot be written, and still has the old text.
+pub fn replace_file(path: &Path, text: &str) -> io::Result<()> {
+    // In the same folder.
+    let mut next = path.as_os_str().to_owned();
+    next.push(".new");
+    let next = PathBuf::from(next);
+    // In a shared folder the name may be another user's link, which must not be followed.
+    match fs::remove_file(&next) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+        _ => {}
+    }
+    let mut file = File::create_new(&next)?;
+    file.write_all(text.as_bytes())?;
+    file.sync_all()?;
+    drop(file);
+    fs::rename(&next, path)?;
+    #[cfg(unix)]
+    {
+        let folder = path.parent().filter(|it| !it.as_os_str().is_empty());
+        File::open(folder.unwrap_or(Path::new(".")))?.sync_all()?;
+    }
+    Ok(())
 }
 
 fn parse(file: &str, text: &str) -> Result<Patch, Mistakes> {

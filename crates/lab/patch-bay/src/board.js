@@ -1,161 +1,32 @@
 'use strict';
 
-// Draws the board: boxes of clients, their pins, and the cables between them. page.js handles clicks and drags.
+// Draws the board: boxes of clients, their channels, frames of groups, and the cables between them.
 const board = (() => {
   const clients = document.getElementById('clients');
   const cables = document.getElementById('cables');
+  const frames = document.getElementById('frames');
+  const sheet = document.getElementById('sheet');
   const SVG = 'http://www.w3.org/2000/svg';
-  /** Boxes by the names of their clients: { element, shape }. */
+  /** On a narrow screen boxes are in one column, in the order of their places. */
+  const narrow = matchMedia('(max-width: 640px)');
+  /** The space around all boxes. */
+  const MARGIN = 24;
+  /** Boxes by the names of their clients: { element, title, isFolded, pins }. */
   const boxes = new Map();
-  /** Pins by their names: { element, value, name, kind, isInput, isAnalog, isOn, connections }. */
-  const pins = new Map();
-  /** Cables by their inputs. */
+  /** Drawn channels by their names: { element, text }. */
+  const drawn = new Map();
+  /** Drawn cables by their inputs: { group, paths, input, output }. */
   const wires = new Map();
+  /** Boxes that are being dragged: their places. */
+  const dragged = new Map();
+  let words = [];
+  let isDue = false;
 
   function element(kind, classes, text) {
     const made = document.createElement(kind);
     made.className = classes;
     if (text !== undefined) made.textContent = text;
     return made;
-  }
-
-  function makePin(name, isHere, label) {
-    const channel = name.slice(name.indexOf(':') + 1);
-    const isInput = /^A?I/.test(channel);
-    const isAnalog = channel.startsWith('A');
-    const button = element('button', `pin ${isInput ? 'input' : 'output'}${isAnalog ? ' analog' : ''}`);
-    button.type = 'button';
-    button.dataset.pin = name;
-    button.setAttribute('aria-pressed', 'false');
-    const value = element('span', 'value');
-    button.append(element('span', 'jack'), element('span', 'label', channel));
-    if (label) {
-      const called = element('span', 'called', label);
-      called.title = label;
-      button.append(called);
-    }
-    button.append(value);
-    const pin = { element: button, text: value, name, label, channel, isInput, isAnalog, isHere, isOn: false, isForced: false };
-    pins.set(name, pin);
-    return button;
-  }
-
-  function makeBox(client, shape) {
-    const box = element('section', client.isHere ? 'client' : 'client away');
-    box.dataset.name = client.name;
-    box.setAttribute('aria-label', client.name);
-    const header = element('header', '');
-    const role = client.role === 'VR' ? 'controller' : 'process';
-    header.append(element('h2', '', client.name),
-      element('p', '', client.isHere ? `${role} at ${client.address}` : 'not here; its cables wait'));
-    const sides = element('div', 'sides');
-    for (const isInput of [true, false]) {
-      const list = element('ul', '');
-      for (const { channel, label } of client.channels) {
-        if (/^A?I/.test(channel) !== isInput) continue;
-        const item = element('li', '');
-        item.append(makePin(`${client.name}:${channel}`, client.isHere, label));
-        list.append(item);
-      }
-      sides.append(list);
-    }
-    box.append(header, sides);
-    return { element: box, shape };
-  }
-
-  /** All clients: connected ones, and those that only cables remember. */
-  function everyone(state) {
-    const all = state.clients.map((client) => ({ ...client, isHere: true }));
-    const here = new Map(all.map((client) => [client.name, new Set(client.channels.map(({ channel }) => channel))]));
-    const away = new Map();
-    const missing = [];
-    for (const { input, output } of state.connections) {
-      for (const pin of [input, output]) {
-        const [name, channel] = pin.split(':');
-        const channels = here.get(name) ?? away.get(name) ?? new Set();
-        if (channels.has(channel)) continue;
-        channels.add(channel);
-        if (!here.has(name)) away.set(name, channels);
-        else missing.push([name, channel]);
-      }
-    }
-    // A cable can remember a channel that its client no longer has.
-    const byName = new Map(all.map((client) => [client.name, client]));
-    for (const [name, channel] of missing) byName.get(name).channels.push({ channel, value: null, forced: null });
-    for (const [name, channels] of away) {
-      const list = [...channels].sort((one, other) => one.localeCompare(other, 'en', { numeric: true }));
-      all.push({ name, isHere: false, channels: list.map((channel) => ({ channel, value: null, forced: null })) });
-    }
-    return all;
-  }
-
-  /** The level that inputs derive from a pin: on above 8 V, off below 5 V, unchanged in between. */
-  function isOn(pin, value) {
-    if (value === null) return false;
-    const number = Number(value);
-    if (pin.isAnalog) return Boolean(number);
-    return number > 8 || (number >= 5 && pin.isOn);
-  }
-
-  function describe(pin, value, own, sources) {
-    const called = pin.label ? `${pin.label}, ` : '';
-    const parts = [`${called}${pin.name} ${pin.isAnalog ? 'analog' : 'digital'} ${pin.isInput ? 'input' : 'output'}`];
-    parts.push(!pin.isHere ? 'not here' : value === null ? 'no value yet' : value);
-    if (pin.isForced) parts.push(own === null ? 'forced' : `forced, its client says ${own}`);
-    if (sources) parts.push(`connected with ${sources.join(' and ')}`);
-    return parts.join(', ');
-  }
-
-  function show(state) {
-    const focused = document.activeElement;
-    const focusedPin = focused?.dataset?.pin;
-    const focusedCable = focused?.closest?.('g.cable')?.dataset.input;
-    const all = everyone(state);
-    const names = new Set(all.map((client) => client.name));
-    let isMoved = false;
-    for (const [name, box] of boxes) {
-      if (names.has(name)) continue;
-      forget(name, box);
-      isMoved = true;
-    }
-    all.forEach((client, place) => {
-      const shape = JSON.stringify([client.isHere, client.role, client.address, client.channels.map((it) => [it.channel, it.label])]);
-      let box = boxes.get(client.name);
-      if (!box || box.shape !== shape) {
-        if (box) forget(client.name, box);
-        box = makeBox(client, shape);
-        boxes.set(client.name, box);
-        clients.insertBefore(box.element, clients.children[place] || null);
-        isMoved = true;
-      } else if (clients.children[place] !== box.element) {
-        clients.insertBefore(box.element, clients.children[place] || null);
-        isMoved = true;
-      }
-    });
-    const partners = new Map();
-    for (const { input, output } of state.connections) {
-      partners.set(input, [output]);
-      partners.set(output, [...(partners.get(output) || []), input]);
-    }
-    for (const client of all) {
-      for (const { channel, value, forced } of client.channels) {
-        const pin = pins.get(`${client.name}:${channel}`);
-        const shown = forced ?? value;
-        pin.isForced = forced !== null;
-        pin.isOn = isOn(pin, shown);
-        pin.value = shown;
-        const own = pin.isForced && !pin.isInput && value !== forced ? value : null;
-        const behind = own === null ? '' : ` (${own})`;
-        setText(pin.text, pin.isForced ? `${forced} forced${behind}` : shown ?? '–');
-        pin.element.classList.toggle('on', pin.isOn);
-        pin.element.classList.toggle('forced', pin.isForced);
-        setAttribute(pin.element, 'aria-label', describe(pin, shown, own, partners.get(pin.name)));
-      }
-    }
-    showCables(state.connections, isMoved);
-    // The focused element may have been moved or rebuilt; if its cable is gone, focus the input.
-    const next = pins.get(focusedPin)?.element ?? wires.get(focusedCable)?.group ?? pins.get(focusedCable)?.element;
-    if (next && document.activeElement !== next) next.focus({ preventScroll: true });
   }
 
   function setAttribute(node, name, text) {
@@ -166,34 +37,148 @@ const board = (() => {
     if (node.textContent !== text) node.textContent = text;
   }
 
-  function forget(name, box) {
-    box.element.remove();
-    boxes.delete(name);
-    for (const pin of pins.keys()) if (pin.startsWith(`${name}:`)) pins.delete(pin);
+  function makePin(pin) {
+    const button = element('button', `pin ${pin.isInput ? 'input' : 'output'}${pin.isAnalog ? ' analog' : ''}`);
+    button.type = 'button';
+    button.dataset.pin = pin.name;
+    button.setAttribute('aria-pressed', 'false');
+    const value = element('span', 'value');
+    // The blanks keep the words apart for those who listen.
+    button.append(element('span', 'jack'), element('span', 'label', pin.channel), ' ');
+    if (pin.label) {
+      const called = element('span', 'called', pin.label);
+      called.title = pin.label;
+      button.append(called, ' ');
+    }
+    button.append(value);
+    drawn.set(pin.name, { element: button, text: value });
+    return button;
   }
 
-  function showCables(connections, isMoved) {
-    const inputs = new Set(connections.map(({ input }) => input));
-    let isChanged = isMoved;
+  function makeBox(client) {
+    const isFolded = lab.isFolded(client.name);
+    const box = element('section', client.isHere ? 'client' : 'client away');
+    const pins = [...client.inputs, ...client.outputs];
+    box.classList.toggle('named', pins.some(({ label }) => label));
+    box.classList.toggle('folded', isFolded);
+    box.dataset.name = client.name;
+    box.setAttribute('aria-label', client.name);
+    const header = element('header', '');
+    const role = client.role === 'VR' ? 'controller' : 'process';
+    const title = element('button', 'title', client.name);
+    title.type = 'button';
+    title.setAttribute('aria-expanded', String(!isFolded));
+    title.setAttribute('aria-describedby', 'title-help');
+    const heading = element('h2', '');
+    heading.append(title);
+    header.append(heading, element('p', '', client.isHere ? `${role} at ${client.address}` : 'not here; its cables wait'));
+    box.append(header);
+    if (!isFolded) {
+      const sides = element('div', 'sides');
+      for (const side of [client.inputs, client.outputs]) {
+        const list = element('ul', '');
+        for (const pin of side) {
+          const item = element('li', '');
+          item.append(makePin(pin));
+          list.append(item);
+        }
+        sides.append(list);
+      }
+      box.append(sides);
+    }
+    return { element: box, title, isFolded, pins };
+  }
+
+  function forget(name) {
+    const box = boxes.get(name);
+    if (!box) return;
+    box.element.remove();
+    boxes.delete(name);
+    for (const pin of box.pins) drawn.delete(pin.name);
+  }
+
+  function describe(pin, text) {
+    const parts = [`${pin.channel}${pin.label ? ` ${pin.label}` : ''} ${text}`];
+    parts.push(`${pin.isAnalog ? 'analog' : 'digital'} ${pin.isInput ? 'input' : 'output'} of ${pin.client}`);
+    if (!pin.isHere) parts.push('not here');
+    else if (pin.value === null) parts.push('no value yet');
+    const partners = lab.cablesOf(pin).map(({ input, output }) => (pin.isInput ? output : input));
+    if (partners.length) parts.push(`connected with ${partners.join(' and ')}`);
+    return parts.join(', ');
+  }
+
+  function paint(pin) {
+    const shown = drawn.get(pin.name);
+    if (!shown) return;
+    const own = pin.isForced && !pin.isInput && pin.raw.value !== pin.raw.forced && pin.raw.value !== null ? pin.raw.value : null;
+    const text = pin.isForced ? `${pin.value} forced${own === null ? '' : ` (${own})`}` : pin.value ?? '–';
+    setText(shown.text, text);
+    shown.element.classList.toggle('on', pin.isOn);
+    shown.element.classList.toggle('forced', pin.isForced);
+    shown.element.classList.toggle('beside', !isFound(pin));
+    setAttribute(shown.element, 'aria-label', describe(pin, text));
+  }
+
+  /** Shows what `lab.take` has returned. */
+  function show({ isOther, reshaped, changed, placed }) {
+    const focused = document.activeElement;
+    const focusedPin = focused?.dataset?.pin;
+    const focusedBox = focused?.closest?.('.client')?.dataset.name;
+    const isTitle = focused?.classList?.contains('title');
+    const focusedCable = focused?.closest?.('g.cable')?.dataset.input;
+    if (isOther || placed) {
+      for (const name of boxes.keys()) if (!lab.clients.has(name)) forget(name);
+      let before = null;
+      for (const client of lab.clients.values()) {
+        let box = boxes.get(client.name);
+        if (!box || reshaped.has(client.name) || box.isFolded !== lab.isFolded(client.name)) {
+          forget(client.name);
+          box = makeBox(client);
+          boxes.set(client.name, box);
+          for (const pin of box.pins) paint(pin);
+        }
+        const next = before ? before.element.nextSibling : clients.firstChild;
+        if (next !== box.element) clients.insertBefore(box.element, next);
+        before = box;
+      }
+      place();
+      showCables();
+    }
+    for (const pin of changed) {
+      paint(pin);
+      if (!isOther && !pin.isInput) for (const { input } of lab.cablesOf(pin)) wires.get(input)?.group.classList.toggle('on', pin.isOn);
+    }
+    // The focused element may have been rebuilt; if its cable is gone, focus the input.
+    const again = drawn.get(focusedPin)?.element ?? (isTitle ? boxes.get(focusedBox)?.title : undefined)
+      ?? wires.get(focusedCable)?.group ?? drawn.get(focusedCable)?.element;
+    if (again && document.activeElement !== again) again.focus({ preventScroll: true });
+  }
+
+  /** Puts the boxes to their places. */
+  function place() {
+    for (const [name, box] of boxes) {
+      const at = dragged.get(name) ?? lab.places.get(name) ?? { x: 0, y: 0 };
+      box.element.style.setProperty('left', `${at.x + MARGIN}px`);
+      box.element.style.setProperty('top', `${at.y + MARGIN}px`);
+      box.element.style.setProperty('order', Math.round(at.y / 40) * 40 + Math.round(at.x / 1000));
+    }
+    drawSoon();
+  }
+
+  function showCables() {
     for (const [input, wire] of wires) {
-      if (inputs.has(input)) continue;
+      if (lab.cables.get(input)?.output === wire.output) continue;
       wire.group.remove();
       wires.delete(input);
     }
-    for (const { input, output, awake } of connections) {
-      let wire = wires.get(input);
-      if (!wire || wire.output !== output) {
-        if (wire) wire.group.remove();
-        wire = makeCable(input, output);
-        isChanged = true;
-      }
-      const source = pins.get(output);
+    for (const { input, output, awake } of lab.cables.values()) {
+      const wire = wires.get(input) ?? makeCable(input, output);
+      const source = lab.pins.get(output);
       const classes = wire.group.classList;
       classes.toggle('analog', source.isAnalog);
       classes.toggle('on', source.isOn);
       classes.toggle('asleep', !awake);
     }
-    if (isChanged) draw();
   }
 
   function makeCable(input, output) {
@@ -215,69 +200,140 @@ const board = (() => {
     return wire;
   }
 
-  /** The middle of a pin's jack, on the board. */
-  function place(pin) {
-    const origin = cables.getBoundingClientRect();
-    const jack = pin.element.querySelector('.jack').getBoundingClientRect();
-    return [jack.left + jack.width / 2 - origin.left, jack.top + jack.height / 2 - origin.top];
+  /** The rectangles of all boxes on the sheet. */
+  function rectangles() {
+    const all = new Map();
+    for (const [name, { element: box }] of boxes) {
+      const { offsetLeft: left, offsetTop: top, offsetWidth: width, offsetHeight: height } = box;
+      all.set(name, { left, top, right: left + width, bottom: top + height });
+    }
+    return all;
   }
 
-  /** A cable that hangs from an output's right to an input's left; `low` is a height that it must pass. */
-  function curve([x1, y1], [x2, y2], low) {
-    const width = cables.clientWidth;
-    const reach = Math.max(28, Math.min(120, Math.abs(x2 - x1) / 2));
-    // A cable back to the left, to another row of boxes, would hook around its end.
-    const sag = x2 > x1 ? Math.min(70, Math.hypot(x2 - x1, y2 - y1) / 7) : 0;
-    const out = Math.min(x1 + reach, width + 14);
-    const back = Math.max(x2 - reach, -14);
-    // At the middle of a cubic curve, each end has an eighth of the weight.
-    const [down, up] = low === undefined ? [y1 + sag, y2 + sag] : [0, 0].fill((8 * low - y1 - y2) / 6);
-    return `M${x1},${y1} C${out},${down} ${back},${up} ${x2},${y2}`;
+  /** The middle of a channel's jack on the sheet; that of a folded box is in its header. */
+  function end(pin, box) {
+    const shown = drawn.get(pin.name)?.element;
+    const y = shown ? box.top + shown.offsetTop + shown.offsetHeight / 2 : (box.top + box.bottom) / 2;
+    return [pin.isInput ? box.left : box.right, Math.round(y)];
   }
 
-  /** The height below the boxes of two pins if the cable goes back to the left in one row: otherwise it would cross them. */
-  function below(source, sink) {
-    const [from, to] = [source, sink].map((pin) => pin.element.closest('.client').getBoundingClientRect());
-    const isBack = to.left <= from.left && to.top < from.bottom && from.top < to.bottom;
-    return isBack ? Math.max(from.bottom, to.bottom) + 14 - cables.getBoundingClientRect().top : undefined;
+  /** Draws cables and frames with the next frame of the screen. */
+  function drawSoon() {
+    if (isDue) return;
+    isDue = true;
+    requestAnimationFrame(() => {
+      isDue = false;
+      draw();
+    });
   }
 
   function draw() {
+    if (!sheet.offsetParent) return;
     // Read the whole layout before writing anything, which would force a new layout.
-    const lines = [...wires.values()].map(({ paths, input, output }) => {
-      const [source, sink] = [pins.get(output), pins.get(input)];
-      return [paths, curve(place(source), place(sink), below(source, sink))];
-    });
-    for (const [paths, line] of lines) for (const path of paths) setAttribute(path, 'd', line);
+    const all = rectangles();
+    const list = [];
+    for (const { input, output } of wires.values()) {
+      const [source, sink] = [lab.pins.get(output), lab.pins.get(input)];
+      const [one, other] = [all.get(source.client), all.get(sink.client)];
+      list.push({ key: input, output, from: end(source, one), to: end(sink, other) });
+    }
+    const room = narrow.matches ? { beside: 0, between: 6 } : { beside: 48, between: 12 };
+    const lines = route.all([...all.values()], list, room);
+    for (const [input, line] of lines) for (const path of wires.get(input).paths) setAttribute(path, 'd', line);
+    let [right, bottom] = [0, 0];
+    for (const box of all.values()) {
+      right = Math.max(right, box.right);
+      bottom = Math.max(bottom, box.bottom);
+    }
+    sheet.style.setProperty('--width', `${right + MARGIN + 48}px`);
+    sheet.style.setProperty('--height', `${bottom + MARGIN + 24}px`);
+    drawFrames(all);
+  }
+
+  /** The members of each group. */
+  function groups() {
+    const all = new Map();
+    for (const name of boxes.keys()) {
+      const group = lab.places.get(name)?.group;
+      if (group) all.set(group, [...all.get(group) ?? [], name]);
+    }
+    return all;
+  }
+
+  function drawFrames(all) {
+    const wanted = narrow.matches ? new Map() : groups();
+    for (const frame of [...frames.children]) if (!wanted.has(frame.dataset.group)) frame.remove();
+    for (const [group, members] of wanted) {
+      let frame = [...frames.children].find((it) => it.dataset.group === group);
+      if (!frame) {
+        frame = element('div', 'frame');
+        frame.dataset.group = group;
+        const name = element('button', 'frame-name', group);
+        name.type = 'button';
+        frame.append(name);
+        frames.append(frame);
+      }
+      const its = members.map((name) => all.get(name));
+      const [left, top] = ['left', 'top'].map((side) => Math.min(...its.map((box) => box[side])));
+      const [right, bottom] = ['right', 'bottom'].map((side) => Math.max(...its.map((box) => box[side])));
+      const set = (key, value) => frame.style.setProperty(key, `${value}px`);
+      set('left', left - 10);
+      set('top', top - 22);
+      set('width', right - left + 20);
+      set('height', bottom - top + 32);
+    }
   }
 
   const loose = document.createElementNS(SVG, 'path');
   loose.setAttribute('class', 'pending');
 
-  /** Draws the cable that is being dragged, from a pin to a point of the window. */
+  /** Draws the cable that is being dragged, from a channel to a point of the window. */
   function drag(pin, x, y) {
     const origin = cables.getBoundingClientRect();
-    const from = place(pin);
+    const from = end(pin, rectangles().get(pin.client));
     const to = [x - origin.left, y - origin.top];
-    loose.setAttribute('d', pin.isInput ? curve(to, from) : curve(from, to));
+    loose.setAttribute('d', pin.isInput ? route.loose(to, from) : route.loose(from, to));
     cables.append(loose);
+  }
+
+  function isFound(pin) {
+    const names = `${pin.name} ${pin.label ?? ''}`.toLowerCase();
+    return words.every((word) => names.includes(word));
   }
 
   /** Marks the channels whose client, channel or label has all words of `text`; returns them in the order of the page. */
   function search(text) {
-    const words = text.toLowerCase().split(/\s+/).filter(Boolean);
+    words = text.toLowerCase().split(/\s+/).filter(Boolean);
     const found = [];
-    for (const pin of pins.values()) {
-      const names = `${pin.name} ${pin.label ?? ''}`.toLowerCase();
-      const isFound = words.every((word) => names.includes(word));
-      pin.element.classList.toggle('beside', !isFound);
-      if (isFound && words.length) found.push(pin);
+    for (const client of lab.clients.values()) {
+      let some = false;
+      for (const pin of [...client.inputs, ...client.outputs]) {
+        const isHit = isFound(pin);
+        some ||= isHit;
+        drawn.get(pin.name)?.element.classList.toggle('beside', !isHit);
+        if (isHit && words.length) found.push(pin);
+      }
+      boxes.get(client.name)?.element.classList.toggle('nothing', !some);
     }
-    const isBefore = (one, other) => one.element.compareDocumentPosition(other.element) & Node.DOCUMENT_POSITION_FOLLOWING;
-    return found.sort((one, other) => (isBefore(one, other) ? -1 : 1));
+    return found;
   }
 
-  new ResizeObserver(draw).observe(clients);
+  /** Shows the path of a channel or cable, and dims the rest; without a name it shows everything. */
+  function trace(name, isCable) {
+    board.traced = name;
+    const path = name ? lab.path(name, isCable) : null;
+    sheet.classList.toggle('tracing', Boolean(path?.near.size));
+    for (const [input, { group }] of wires) {
+      group.classList.toggle('near', Boolean(path?.near.has(input)));
+      group.classList.toggle('far', Boolean(path?.far.has(input)));
+    }
+    for (const [pin, { element: button }] of drawn) button.classList.toggle('on-path', Boolean(path?.ends.has(pin)));
+    const passed = new Set(Array.from(path?.ends ?? [], lab.clientOf));
+    for (const [client, { element: box }] of boxes) box.classList.toggle('on-path', passed.has(client));
+  }
 
-  return { show, search, setAttribute, drag, drop: () => loose.remove(), pins, wires, clients, cables };
+  new ResizeObserver(drawSoon).observe(sheet);
+  narrow.addEventListener('change', drawSoon);
+
+  return { show, place, search, trace, setAttribute, setText, element, drag, dragged, groups, rectangles, drop: () => loose.remove(), drawn, wires, boxes, clients, cables, frames, narrow, draw: drawSoon, traced: null };
 })();

@@ -2,36 +2,116 @@
 
 use std::fmt::{self, Display, Write as _};
 
-use tickbus_dispatcher::{ClientState, Label, Number, Snapshot};
+use tickbus_dispatcher::{ChannelState, ClientState, Label, Number, Pin};
 
-/// The state of the page, in one line. Of its texts, only labels can contain characters to escape.
-pub(crate) fn state(snapshot: &Snapshot) -> String {
+use crate::layout::Place;
+use crate::model::{Cable, Gone, Model, Shown};
+
+/// The board in one line; with `seen`, what has changed since the state with this number.
+pub(crate) fn state(model: &Model, seen: Option<u64>) -> String {
     let mut json = String::new();
     // Writing to a String cannot fail.
-    let _ = write(snapshot, &mut json);
+    let _ = match seen {
+        None => write_all(model, &mut json),
+        Some(seen) => write_changes(model, seen, &mut json),
+    };
     json
 }
 
-fn write(snapshot: &Snapshot, json: &mut String) -> fmt::Result {
-    json.push_str("{\"clients\":[");
-    for (at, client) in snapshot.clients.iter().enumerate() {
-        comma(at, json);
-        write_client(client, json)?;
-    }
+fn write_all(model: &Model, json: &mut String) -> fmt::Result {
+    json.push_str("{\"full\":true,\"clients\":[");
+    let clients = model.clients.iter();
+    write_list(json, clients, |json, client| {
+        write_client(json, &client.state)
+    })?;
     json.push_str("],\"connections\":[");
-    for (at, connection) in snapshot.connections.iter().enumerate() {
-        comma(at, json);
-        write!(
-            json,
-            "{{\"input\":\"{}\",\"output\":\"{}\",\"awake\":{}}}",
-            connection.sink, connection.source, connection.is_awake
-        )?;
-    }
-    json.push_str("]}");
+    write_list(json, model.cables.iter(), write_cable)?;
+    json.push_str("],\"places\":{");
+    write_list(json, model.layout.places.iter(), write_place)?;
+    json.push_str("}}");
     Ok(())
 }
 
-fn write_client(client: &ClientState, json: &mut String) -> fmt::Result {
+/// The parts in which nothing has changed are left out. A client that has gone and come again is in two lists.
+fn write_changes(model: &Model, seen: u64, json: &mut String) -> fmt::Result {
+    json.push('{');
+    let gone = || {
+        let all = model.gone.iter().rev();
+        all.take_while(|(number, _)| *number > seen)
+            .map(|(_, gone)| gone)
+    };
+    let clients = gone().filter_map(|gone| match gone {
+        Gone::Client(name) => Some(name),
+        Gone::Cable(_) => None,
+    });
+    write_part(json, "gone", ('[', ']'), clients, |json, name| {
+        write!(json, "\"{name}\"")
+    })?;
+    let inputs = gone().filter_map(|gone| match gone {
+        Gone::Cable(sink) => Some(sink),
+        Gone::Client(_) => None,
+    });
+    write_part(json, "cut", ('[', ']'), inputs, |json, sink| {
+        write!(json, "\"{sink}\"")
+    })?;
+    let clients = model.clients.iter().filter(|client| client.shaped > seen);
+    write_part(json, "clients", ('[', ']'), clients, |json, client| {
+        write_client(json, &client.state)
+    })?;
+    let clients = model.clients.iter();
+    let clients = clients.filter(|client| client.shaped <= seen && client.newest > seen);
+    write_part(json, "values", ('{', '}'), clients, |json, client| {
+        write_values(json, client, seen)
+    })?;
+    let cables = model
+        .cables
+        .iter()
+        .filter(|(_, cable)| cable.changed > seen);
+    write_part(json, "connections", ('[', ']'), cables, write_cable)?;
+    let places = model
+        .layout
+        .places
+        .iter()
+        .filter(|(_, place)| place.changed > seen);
+    write_part(json, "places", ('{', '}'), places, write_place)?;
+    json.push('}');
+    Ok(())
+}
+
+/// A list under its key, unless it is empty.
+fn write_part<T>(
+    json: &mut String,
+    key: &str,
+    (open, close): (char, char),
+    list: impl Iterator<Item = T>,
+    write: impl Fn(&mut String, T) -> fmt::Result,
+) -> fmt::Result {
+    let mut list = list.peekable();
+    if list.peek().is_none() {
+        return Ok(());
+    }
+    let comma = if json.len() > 1 { "," } else { "" };
+    write!(json, "{comma}\"{key}\":{open}")?;
+    write_list(json, list, write)?;
+    json.push(close);
+    Ok(())
+}
+
+fn write_list<T>(
+    json: &mut String,
+    list: impl Iterator<Item = T>,
+    write: impl Fn(&mut String, T) -> fmt::Result,
+) -> fmt::Result {
+    for (at, it) in list.enumerate() {
+        if at > 0 {
+            json.push(',');
+        }
+        write(json, it)?;
+    }
+    Ok(())
+}
+
+fn write_client(json: &mut String, client: &ClientState) -> fmt::Result {
     let device = &client.device;
     write!(
         json,
@@ -40,8 +120,7 @@ fn write_client(client: &ClientState, json: &mut String) -> fmt::Result {
         device.role.keyword(),
         device.peer
     )?;
-    for (at, channel) in client.channels.iter().enumerate() {
-        comma(at, json);
+    write_list(json, client.channels.iter(), |json, channel| {
         write!(
             json,
             "{{\"channel\":\"{}\",\"label\":{},\"value\":{},\"forced\":{}}}",
@@ -49,16 +128,55 @@ fn write_client(client: &ClientState, json: &mut String) -> fmt::Result {
             Labelled(channel.label.as_ref()),
             Quoted(channel.value),
             Quoted(channel.forced)
-        )?;
-    }
+        )
+    })?;
     json.push_str("]}");
     Ok(())
 }
 
-fn comma(at: usize, json: &mut String) {
-    if at > 0 {
-        json.push(',');
-    }
+/// `"PUMP":{"Q1":"24","I1":["0","7.5"]}`: values, and the forced ones behind them.
+fn write_values(json: &mut String, client: &Shown, seen: u64) -> fmt::Result {
+    write!(json, "\"{}\":{{", client.state.device.name)?;
+    let channels = client.state.channels.iter().zip(&client.changed);
+    let changed = channels.filter(|(_, changed)| **changed > seen);
+    write_list(json, changed, |json, (channel, _)| {
+        let ChannelState {
+            channel,
+            value,
+            forced,
+            ..
+        } = channel;
+        match forced {
+            None => write!(json, "\"{channel}\":{}", Quoted(*value)),
+            Some(_) => write!(
+                json,
+                "\"{channel}\":[{},{}]",
+                Quoted(*value),
+                Quoted(*forced)
+            ),
+        }
+    })?;
+    json.push('}');
+    Ok(())
+}
+
+fn write_cable(json: &mut String, (sink, cable): (&Pin, &Cable)) -> fmt::Result {
+    write!(
+        json,
+        "{{\"input\":\"{sink}\",\"output\":\"{}\",\"awake\":{}}}",
+        cable.source, cable.is_awake
+    )
+}
+
+fn write_place(json: &mut String, (name, place): (&String, &Place)) -> fmt::Result {
+    write!(
+        json,
+        "\"{name}\":{{\"x\":{},\"y\":{},\"folded\":{},\"group\":{}}}",
+        place.spot.x,
+        place.spot.y,
+        place.is_folded,
+        Labelled(place.group.as_ref())
+    )
 }
 
 /// A number as text, which rounds nothing, or `null`.
@@ -73,7 +191,7 @@ impl Display for Quoted {
     }
 }
 
-/// A label as text, or `null`.
+/// A label as text, or `null`. Of the texts here, only labels can contain characters to escape.
 struct Labelled<'a>(Option<&'a Label>);
 
 impl Display for Labelled<'_> {

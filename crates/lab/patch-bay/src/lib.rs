@@ -2,10 +2,26 @@
 //!
 //! docs/dispatcher.md describes it, for users and for programs.
 
+mod arrange;
 mod json;
+mod layout;
+mod layout_file;
+mod model;
 
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use tickbus_base::toml_text::Mistakes;
 use tickbus_dispatcher::{Door, Number, Order, Pin, Reply};
 use tickbus_web::{Answer, Asset, Change, Outcome, Refused, Site, State, Verb};
+
+use crate::layout::Layout;
+use crate::layout_file::LayoutFile;
+use crate::model::Shared;
+
+/// The longest description of a layout: that of thousands of boxes.
+const LONGEST_LAYOUT: usize = 4 << 20;
 
 /// The files of the page.
 const ASSETS: &[Asset] = &[
@@ -45,9 +61,34 @@ const ASSETS: &[Asset] = &[
         text: tickbus_web::STYLE,
     },
     Asset {
+        path: "/state.js",
+        kind: "text/javascript; charset=utf-8",
+        text: include_str!("state.js"),
+    },
+    Asset {
+        path: "/route.js",
+        kind: "text/javascript; charset=utf-8",
+        text: include_str!("route.js"),
+    },
+    Asset {
         path: "/board.js",
         kind: "text/javascript; charset=utf-8",
         text: include_str!("board.js"),
+    },
+    Asset {
+        path: "/changes.js",
+        kind: "text/javascript; charset=utf-8",
+        text: include_str!("changes.js"),
+    },
+    Asset {
+        path: "/layout.js",
+        kind: "text/javascript; charset=utf-8",
+        text: include_str!("layout.js"),
+    },
+    Asset {
+        path: "/matrix.js",
+        kind: "text/javascript; charset=utf-8",
+        text: include_str!("matrix.js"),
     },
     Asset {
         path: "/patch-bay.js",
@@ -60,12 +101,68 @@ const ASSETS: &[Asset] = &[
 #[derive(Clone, Debug)]
 pub struct PatchBay {
     door: Door,
+    model: Arc<Shared>,
+}
+
+/// Why a kept layout cannot be used.
+#[derive(Debug)]
+pub enum LayoutRefused {
+    /// The file is wrong.
+    Mistakes(Mistakes),
+    /// The system could not start a thread.
+    System(io::Error),
 }
 
 impl PatchBay {
-    /// The page of this dispatcher.
-    pub const fn new(door: Door) -> Self {
-        Self { door }
+    /// The page of this dispatcher, with a layout that ends with the page.
+    pub fn new(door: Door) -> Self {
+        let model = Arc::new(Shared::new(Layout::default()));
+        Self { door, model }
+    }
+
+    /// The page of this dispatcher, with the layout of a file. `report` gets a sentence when the file cannot be written.
+    ///
+    /// # Errors
+    ///
+    /// The file has mistakes, or there is no thread to write it.
+    pub fn with_layout(
+        door: Door,
+        file: &Path,
+        report: impl Fn(String) + Send + 'static,
+    ) -> Result<Self, LayoutRefused> {
+        let places = layout_file::load(file).map_err(LayoutRefused::Mistakes)?;
+        let file = LayoutFile::start(file.to_owned(), report).map_err(LayoutRefused::System)?;
+        let model = Arc::new(Shared::new(Layout::new(places, file)));
+        Ok(Self { door, model })
+    }
+
+    /// The file of the layout beside that of the patch: `patch.layout.toml` beside `patch.toml`.
+    pub fn layout_beside(patch: &Path) -> PathBuf {
+        patch.with_extension("layout.toml")
+    }
+
+    fn change_layout(&self, verb: Verb, path: &str, body: &str) -> Outcome {
+        let refuse = |status, text: String| Err(Refused { status, text });
+        self.model.with(|model| {
+            let number = model.number + 1;
+            match (verb, path) {
+                (Verb::Put, "/layout") => {
+                    if let Err(text) = model.layout.change(body, number) {
+                        return refuse(400, text);
+                    }
+                }
+                (Verb::Put, "/layout/arranged") => {
+                    let (boxes, links) = model.boxes();
+                    model.layout.arrange(&boxes, &links, number);
+                }
+                _ => {
+                    let text = "change a layout with PUT /layout and PUT /layout/arranged";
+                    return refuse(404, text.to_owned());
+                }
+            }
+            model.number = number;
+            Ok(())
+        })
     }
 }
 
@@ -75,13 +172,27 @@ impl Site for PatchBay {
     }
 
     fn look(&self, answer: Answer<State>) {
-        self.door.send(move |dispatcher, _| {
-            let snapshot = dispatcher.snapshot();
-            answer.give(State::whole(move || json::state(&snapshot)));
+        let model = Arc::clone(&self.model);
+        self.door.send(move |dispatcher, now| {
+            model.leave(dispatcher.snapshot(), now);
+            answer.give(State::Differences(model));
         });
     }
 
+    fn longest_body(&self, path: &str) -> usize {
+        if path == "/layout" {
+            LONGEST_LAYOUT
+        } else {
+            4096
+        }
+    }
+
     fn change(&self, change: Change, answer: Answer<Outcome>) {
+        // Boxes must not move under the pointer of somebody who works with them.
+        self.model.with(|model| model.layout.pin());
+        if change.path.starts_with("/layout") {
+            return answer.give(self.change_layout(change.verb, &change.path, &change.body));
+        }
         match order(&change) {
             Ok(order) => {
                 let reply = Reply::new(move |outcome| {
@@ -106,7 +217,8 @@ fn order(change: &Change) -> Result<Order, Refused> {
     };
     let parts = path.strip_prefix('/').and_then(|it| it.split_once('/'));
     let Some((what @ ("patch" | "force"), pin)) = parts else {
-        let text = "there is nothing to change here; change /patch/NAME:I1 or /force/NAME:I1";
+        let text =
+            "there is nothing to change here; change /patch/NAME:I1, /force/NAME:I1 or /layout";
         return Err(wrong(404, text));
     };
     let pin = Pin::parse(pin).ok_or_else(|| {

@@ -9,33 +9,21 @@
   let chosen = null;
   /** True if choosing another channel connects it to the chosen one; false after forcing, releasing or cutting. */
   let isEnd = false;
-  let state = null;
 
   function say(text, isBad = false) {
     get('status').textContent = text;
     get('status').classList.toggle('bad', isBad);
   }
 
-  async function change(method, path, body, done) {
-    const said = await room.change(method, room.base + path, body);
-    if (said === null) say('The dispatcher does not answer; check the change when it is back.', true);
-    else if (said.ok) say(done);
-    else say(`ERR ${said.code} ${said.text}`, true);
-    return said?.ok === true;
-  }
-
   function connect(one, other) {
     const [input, output] = one.isInput ? [one, other] : [other, one];
     letGo();
-    return change('PUT', `/patch/${input.name}`, output.name, `Connected ${output.name} with ${input.name}.`);
+    return changes.connect(input.name, output.name);
   }
 
-  function cut(name, text) {
-    if (!mayChange) {
-      say('Read-only: nothing was cut.', true);
-      return;
-    }
-    change('DELETE', `/patch/${name}`, undefined, text);
+  function cut(name, cables, text) {
+    if (mayChange) changes.cut(cables, name, text);
+    else say('Read-only: nothing was cut.', true);
   }
 
   // Choosing: the first pin is kept, the second one is its other end.
@@ -46,7 +34,7 @@
 
   function choose(pin) {
     if (chosen && isEnd && chosen !== pin.name && mayChange) {
-      const first = board.pins.get(chosen);
+      const first = lab.pins.get(chosen);
       if (first) {
         connect(first, pin);
         return;
@@ -71,17 +59,18 @@
   }
 
   function showChosen() {
-    const pin = board.pins.get(chosen);
+    const pin = lab.pins.get(chosen);
     if (chosen && !pin) {
       say(`${chosen} has gone.`);
       chosen = null;
     }
     tray.hidden = !pin;
     board.clients.classList.toggle('choosing', Boolean(pin) && isEnd && mayChange);
-    for (const other of board.pins.values()) {
-      board.setAttribute(other.element, 'aria-pressed', String(other === pin));
-      other.element.classList.toggle('fit', Boolean(pin) && fits(pin, other));
-      other.element.classList.toggle('unfit', Boolean(pin) && other !== pin && !fits(pin, other));
+    for (const [name, { element }] of board.drawn) {
+      const other = lab.pins.get(name);
+      board.setAttribute(element, 'aria-pressed', String(other === pin));
+      element.classList.toggle('fit', Boolean(pin) && fits(pin, other));
+      element.classList.toggle('unfit', Boolean(pin) && other !== pin && !fits(pin, other));
     }
     for (const wire of board.wires.values()) {
       wire.group.classList.toggle('of-chosen', Boolean(pin) && (wire.input === pin.name || wire.output === pin.name));
@@ -90,15 +79,17 @@
     get('chosen-name').textContent = pin.name;
     get('chosen-tools').hidden = !mayChange;
     enable(get('release'), pin.isForced, pin);
-    enable(get('cut'), state.connections.some(({ input, output }) => input === pin.name || output === pin.name), pin);
+    enable(get('cut'), lab.cablesOf(pin).length > 0, pin);
   }
 
   /** Disabling a focused button returns the focus to its channel. */
   function enable(button, isEnabled, pin) {
     const isLost = !isEnabled && document.activeElement === button;
     button.disabled = !isEnabled;
-    if (isLost) pin.element.focus({ preventScroll: true });
+    if (isLost) focusOn(pin);
   }
+
+  const focusOn = (pin) => board.drawn.get(pin.name)?.element.focus({ preventScroll: true });
 
   /** After this call, the chosen channel is no longer the first end of a cable. */
   function endChoice() {
@@ -108,30 +99,33 @@
 
   tray.addEventListener('submit', (event) => {
     event.preventDefault();
-    const pin = board.pins.get(chosen);
+    const pin = lab.pins.get(chosen);
     if (!pin) return;
     const number = value.value.trim().replace(',', '.');
     endChoice();
-    change('PUT', `/force/${pin.name}`, number, `${pin.name} is forced to ${number}.`);
+    changes.force(pin.name, number);
   });
   get('release').addEventListener('click', () => {
     endChoice();
-    change('DELETE', `/force/${chosen}`, undefined, `${chosen} is released.`);
+    changes.release(chosen);
   });
   get('cut').addEventListener('click', () => {
     endChoice();
-    cut(chosen, `Cut what was connected with ${chosen}.`);
+    cutAll(lab.pins.get(chosen));
   });
   get('let-go').addEventListener('click', () => {
-    const pin = board.pins.get(chosen);
+    const pin = lab.pins.get(chosen);
     letGo();
     say('');
-    if (pin) pin.element.focus();
+    if (pin) focusOn(pin);
   });
 
   // The pointer: a click chooses, a drag connects.
 
-  const pinAt = (node) => board.pins.get(node?.closest?.('.pin')?.dataset.pin);
+  /** Cuts all cables of a channel. */
+  const cutAll = (pin) => cut(pin.name, lab.cablesOf(pin), `Cut what was connected with ${pin.name}.`);
+
+  const pinAt = (node) => lab.pins.get(node?.closest?.('.pin')?.dataset.pin);
   let held = null;
   let wasDragged = false;
 
@@ -151,7 +145,7 @@
 
   window.addEventListener('pointermove', (event) => {
     if (held?.pointer !== event.pointerId) return;
-    const pin = board.pins.get(held.name);
+    const pin = lab.pins.get(held.name);
     // The button was released outside of the window, or the client has gone.
     if (event.buttons === 0 || !pin) {
       endDrag();
@@ -163,7 +157,7 @@
   });
   window.addEventListener('pointerup', (event) => {
     if (held?.pointer !== event.pointerId) return;
-    const from = board.pins.get(held.name);
+    const from = lab.pins.get(held.name);
     endDrag();
     if (!wasDragged) return;
     const to = pinAt(document.elementFromPoint(event.clientX, event.clientY));
@@ -181,10 +175,11 @@
     if (pin) choose(pin);
   });
 
+  const cutCableOf = (cable) => cut(cable.input, [cable], `Cut the cable from ${cable.output} to ${cable.input}.`);
+
   function cutCable(group) {
-    const wire = board.wires.get(group.dataset.input);
-    if (!wire) return;
-    cut(wire.input, `Cut the cable from ${wire.output} to ${wire.input}.`);
+    const cable = lab.cables.get(group.dataset.input);
+    if (cable) cutCableOf(cable);
   }
 
   board.cables.addEventListener('click', (event) => {
@@ -193,26 +188,38 @@
   });
 
   window.addEventListener('keydown', (event) => {
-    const isTyping = event.target === value || event.target === get('search');
+    const isTyping = event.target.matches('input');
     if (event.key === 'Escape' && held) {
       endDrag();
       return;
     }
     if (event.key === 'Escape' && chosen) {
-      const pin = board.pins.get(chosen);
+      const pin = lab.pins.get(chosen);
       letGo();
       say('Let go.');
-      if (isTyping && pin) pin.element.focus();
+      if (isTyping && pin) focusOn(pin);
       return;
     }
-    if (isTyping || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (event.key === 'Escape' && layout.isChosen) {
+      layout.letGo();
+      return;
+    }
+    if (isTyping || event.altKey) return;
+    if (event.ctrlKey || event.metaKey) {
+      const key = event.key.toLowerCase();
+      if (key === 'y' || (key === 'z' && event.shiftKey)) turn(changes.redo);
+      else if (key === 'z') turn(changes.undo);
+      else return;
+      event.preventDefault();
+      return;
+    }
     const group = event.target.closest?.('g.cable');
     const pin = pinAt(event.target);
     if (event.key === 'Delete' || event.key === 'Backspace') {
       if (group) cutCable(group);
       else if (pin) {
         endChoice();
-        cut(pin.name, `Cut what was connected with ${pin.name}.`);
+        cutAll(pin);
       } else return;
       event.preventDefault();
     } else if ((event.key === 'Enter' || event.key === ' ') && group) {
@@ -229,23 +236,93 @@
     }
   });
 
-  // Searching: other channels fade, and Enter goes to the first that fits.
+  function turn(work) {
+    if (mayChange) work();
+    else say('Read-only: nothing was changed.', true);
+  }
+  get('undo').addEventListener('click', () => turn(changes.undo));
+  get('redo').addEventListener('click', () => turn(changes.redo));
+
+  // The path of the channel or cable under the pointer, or else of the one with the focus.
+
+  function trace(node) {
+    const pin = pinAt(node);
+    const group = node?.closest?.('g.cable');
+    const name = pin?.name ?? group?.dataset.input ?? null;
+    if (name !== board.traced) board.trace(name, Boolean(group));
+  }
+  /** While an end for a cable is looked for, the focus dims nothing. */
+  const traceFocus = () => trace(chosen ? null : document.activeElement);
+  for (const part of [board.clients, board.cables]) {
+    part.addEventListener('pointerover', (event) => { if (event.pointerType !== 'touch' && !held) trace(event.target); });
+    part.addEventListener('pointerleave', traceFocus);
+    part.addEventListener('focusin', traceFocus);
+    part.addEventListener('focusout', () => trace(null));
+  }
+
+  // Searching: other channels fade, and Enter goes from hit to hit.
+
+  let hit = -1;
 
   function search() {
     const text = get('search').value;
     const found = board.search(text);
     const told = text.trim() ? count(found.length, 'channel', 'channels') : '';
-    if (get('found').textContent !== told) get('found').textContent = told;
+    board.setText(get('found'), told);
     return found;
   }
-  get('search').addEventListener('input', search);
-  get('search').addEventListener('keydown', (event) => {
-    if (event.key !== 'Enter') return;
-    event.preventDefault();
-    search()[0]?.element.focus();
+  get('search').addEventListener('input', () => {
+    hit = -1;
+    markHit(null);
+    search();
+    matrix.search(get('search').value);
   });
 
-  // Incoming states.
+  function markHit(pin) {
+    for (const marked of document.querySelectorAll('.pin.hit')) marked.classList.remove('hit');
+    const element = pin && board.drawn.get(pin.name)?.element;
+    element?.classList.add('hit');
+    element?.scrollIntoView({ block: 'center', inline: 'center', behavior: 'instant' });
+    return element;
+  }
+  get('search').addEventListener('keydown', (event) => {
+    if (event.key === 'ArrowDown') {
+      document.querySelector('.pin.hit')?.focus();
+      event.preventDefault();
+    }
+    if (event.key !== 'Enter') return;
+    event.preventDefault();
+    const found = search();
+    if (!found.length) return;
+    hit = (hit + (event.shiftKey ? found.length - 1 : 1) + (hit < 0 && event.shiftKey ? 1 : 0)) % found.length;
+    const pin = found[hit];
+    layout.reveal(pin.client);
+    markHit(pin);
+    board.setText(get('found'), `${hit + 1} of ${found.length}: ${pin.name}${pin.label ? ` ${pin.label}` : ''}`);
+  });
+
+  // Boxes or a table.
+
+  function view(asMatrix) {
+    for (const [id, isIt] of [['as-boxes', !asMatrix], ['as-matrix', asMatrix]]) get(id).setAttribute('aria-pressed', String(isIt));
+    get('board').hidden = asMatrix;
+    get('board-help').hidden = asMatrix;
+    get('matrix-help').hidden = !asMatrix;
+    matrix.open(asMatrix);
+    if (asMatrix) letGo();
+    else board.draw();
+  }
+  get('as-boxes').addEventListener('click', () => view(false));
+  get('as-matrix').addEventListener('click', () => view(true));
+  matrix.listen((input, output) => {
+    if (!input || !output) return;
+    const cable = lab.cables.get(input.name);
+    if (cable?.output === output.name) cutCableOf(cable);
+    else if (mayChange) changes.connect(input.name, output.name);
+    else say('Read-only: nothing was connected.', true);
+  });
+
+  // Incoming events.
 
   function count(number, one, many) {
     return `${number} ${number === 1 ? one : many}`;
@@ -253,21 +330,37 @@
 
   const sayForced = head.alarm('forced', 'bad');
 
-  function show(text) {
-    state = JSON.parse(text);
-    const forced = state.clients.flatMap(({ name, channels }) => channels.filter((it) => it.forced !== null).map((it) => `${name}:${it.channel} to ${it.forced}`));
+  function showForced() {
+    const forced = [...lab.pins.values()].filter((pin) => pin.isForced).map((pin) => `${pin.name} to ${pin.raw.forced}`);
     const further = forced.length > 3 ? ` and ${forced.length - 3} more` : '';
     sayForced(forced.length ? `${count(forced.length, 'channel is', 'channels are')} forced: ${forced.slice(0, 3).join(', ')}${further}` : '');
-    board.show(state);
-    search();
-    if (held && !board.pins.has(held.name)) endDrag();
-    const asleep = state.connections.filter(({ awake }) => !awake).length;
-    const waiting = asleep ? `, ${asleep} of them waiting` : '';
-    head.count(`${count(state.clients.length, 'client', 'clients')}, ${count(state.connections.length, 'cable', 'cables')}${waiting}`);
-    get('empty').hidden = state.clients.length > 0;
-    showChosen();
   }
 
+  function show(text) {
+    const taken = lab.take(JSON.parse(text));
+    if (!taken) return;
+    board.show(taken);
+    matrix.show(taken);
+    showForced();
+    if (held && !lab.pins.has(held.name)) endDrag();
+    if (taken.isOther || taken.placed) {
+      const cables = [...lab.cables.values()];
+      const here = [...lab.clients.values()].filter(({ isHere }) => isHere).length;
+      const asleep = cables.filter(({ awake }) => !awake).length;
+      const waiting = asleep ? `, ${asleep} of them waiting` : '';
+      head.count(`${count(here, 'client', 'clients')}, ${count(cables.length, 'cable', 'cables')}${waiting}`);
+      get('empty').hidden = lab.clients.size > 0;
+      layout.showChosen();
+      if (hit < 0) search();
+      if (board.traced) board.trace(null);
+      showChosen();
+    } else if (chosen && taken.changed.some(({ name }) => name === chosen)) {
+      showChosen();
+    }
+  }
+
+  changes.listen(say);
+  layout.listen(() => mayChange, say);
   head.listen({
     may: 'may change',
     mayNot: 'Open the address that the dispatcher printed, with its token, to change something',

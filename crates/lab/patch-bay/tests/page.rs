@@ -133,7 +133,10 @@ fn a_program_patches_forces_and_sees_the_board() {
         let (status, state) = page.ask("GET /state", "");
         assert_eq!(
             (status, state),
-            (200, json!({"clients": [], "connections": []}))
+            (
+                200,
+                json!({"full": true, "clients": [], "connections": [], "places": {}})
+            )
         );
         let mut pump = Client::join(address, "VP PUMP Q01 I01");
         let mut logo = Client::join(address, "VR LOGO I01 AI01");
@@ -143,13 +146,20 @@ fn a_program_patches_forces_and_sees_the_board() {
         assert_eq!(logo.hear(), "P I1=24");
         page.done("PUT /force/LOGO:I1", "7.50");
         assert_eq!(logo.hear(), "P I1=7.5");
-        let (_, state) = page.ask("GET /state", "");
+        let (_, mut state) = page.ask("GET /state", "");
+        let places = state["places"].take();
+        assert!(
+            places["PUMP"]["x"].as_i64() < places["LOGO"]["x"].as_i64(),
+            "sources are to the left: {places}"
+        );
         let channel = |channel: &str, value: Value, forced: Value| json!({"channel": channel, "label": null, "value": value, "forced": forced});
         let client = |name: &str, role: &str, stream: &TcpStream, channels: Value| {
             let address = stream.local_addr().expect("it is connected").to_string();
             json!({"name": name, "role": role, "address": address, "channels": channels})
         };
         let expected = json!({
+            "full": true,
+            "places": null,
             "clients": [
                 client("PUMP", "VP", &pump.stream, json!([
                     channel("Q1", json!("24"), Value::Null), channel("I1", Value::Null, Value::Null),
@@ -190,5 +200,93 @@ fn a_program_patches_forces_and_sees_the_board() {
         page.refused("PUT /patch/LOGO:I1", "LOGO:I1", 422, text);
         let text = "on is not a number; write one such as 24 or -3.5, of at most 23 characters";
         page.refused("PUT /force/LOGO:I1", "on", 400, text);
+    });
+}
+
+/// The events of a page, as a viewer without the token gets them.
+struct Events(Lines<BufReader<TcpStream>>);
+
+impl Events {
+    fn open(page: &Page) -> Self {
+        let mut stream = TcpStream::connect(page.address).expect("it listens");
+        write!(
+            stream,
+            "GET /events HTTP/1.1\r\nHost: {}\r\n\r\n",
+            page.address
+        )
+        .expect("it reads");
+        Self(BufReader::new(stream).lines())
+    }
+
+    /// The next event that fits.
+    fn until(&mut self, fits: impl Fn(&Value) -> bool) -> Value {
+        loop {
+            let line = self.0.next().expect("a further line").expect("text");
+            let Some(event) = line.strip_prefix("data: ") else {
+                continue;
+            };
+            let event = serde_json::from_str(event).expect("JSON");
+            if fits(&event) {
+                return event;
+            }
+        }
+    }
+}
+
+#[test]
+fn a_viewer_gets_what_has_changed() {
+    serve(|address, page| {
+        let mut pump = Client::join(address, "VP PUMP Q02 I01");
+        let mut logo = Client::join(address, "VR LOGO I01");
+        pump.say("CONNECT Q1:LOGO:I1\r\nP Q1=0");
+        assert_eq!(pump.hear(), "OK CONNECT");
+        assert_eq!(logo.hear(), "P I1=0");
+        let mut events = Events::open(page);
+        let first = events.until(|_| true);
+        assert_eq!(first["full"], true);
+        assert_eq!(first["clients"][0]["name"], "PUMP");
+        // The places of new boxes may follow.
+        pump.say("P Q1=24 Q2=7");
+        let event = events.until(|event| event.get("values").is_some());
+        assert_eq!(
+            event,
+            json!({"values": {"PUMP": {"Q1": "24", "Q2": "7"}, "LOGO": {"I1": "24"}}})
+        );
+        page.done("PUT /force/LOGO:I1", "3");
+        let event = events.until(|event| event.get("values").is_some());
+        assert_eq!(event, json!({"values": {"LOGO": {"I1": ["3", "3"]}}}));
+        // A cable that waits, and one that is cut.
+        drop(logo);
+        let event = events.until(|event| event.get("gone").is_some());
+        assert_eq!(event["gone"], json!(["LOGO"]));
+        assert_eq!(
+            event["connections"],
+            json!([{"input": "LOGO:I1", "output": "PUMP:Q1", "awake": false}])
+        );
+        page.done("DELETE /patch/LOGO:I1", "");
+        let event = events.until(|event| event.get("cut").is_some());
+        assert_eq!(event, json!({"cut": ["LOGO:I1"]}));
+        pump.say("NAME Q2 Valve");
+        let event = events.until(|event| event.get("clients").is_some());
+        assert_eq!(event["clients"][0]["channels"][1]["label"], "Valve");
+        page.done("PUT /layout", r#"{"PUMP":{"x":48,"y":8,"folded":true}}"#);
+        let event = events.until(|event| event.get("places").is_some());
+        let place = json!({"x": 48, "y": 8, "folded": true, "group": null});
+        assert_eq!(event, json!({"places": {"PUMP": place}}));
+        page.done("PUT /layout/arranged", "");
+        let (status, refused) = page.ask("PUT /layout", r#"{"FAN":{"x":1}}"#);
+        assert_eq!(status, 400);
+        assert!(
+            refused["text"]
+                .to_string()
+                .contains("there is no box \\\"FAN\\\""),
+            "{refused}"
+        );
+        page.refused(
+            "DELETE /layout",
+            "",
+            404,
+            "change a layout with PUT /layout and PUT /layout/arranged",
+        );
     });
 }

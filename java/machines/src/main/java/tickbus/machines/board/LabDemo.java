@@ -35,11 +35,13 @@ public final class LabDemo {
     private final LabOptions options;
     private final Timeline timeline;
     private final TestingBoard board = new TestingBoard();
+    private final PrintStream out;
     private final LabFacts facts = new LabFacts();
     private final Stalls stalls;
 
     private LabDemo(LabOptions options, PrintStream out, List<String> notes) {
         this.options = options;
+        this.out = out;
         timeline = new Timeline(event -> out.println(event.line()));
         stalls = new Stalls(TimeSource.system(), options.stepNanos());
         notes.forEach(note -> timeline.add(0, "note", note));
@@ -91,6 +93,9 @@ public final class LabDemo {
         String verdict;
         try (Laboratory lab = new Laboratory(options, timeline)) {
             lab.open();
+            if (lab.page() != null) {
+                out.println("demo-lab: patch bay at " + lab.page());
+            }
             try (Simulator simulator = new Simulator(DeviceDriverFolder.scan(options.drivers()).open(), board,
                     options.control(), options.stepNanos(), TimeSource.system())) {
                 try {
@@ -118,9 +123,17 @@ public final class LabDemo {
         boolean[] over = new boolean[1];
         simulator.run(TickMode.REAL_TIME, () -> {
             if (guard.triggered()) {
+                if (over[0]) {
+                    return false;
+                }
                 throw new DemoFailure("interrupted");
             }
             long now = simulator.simulationNanos();
+            if (over[0]) {
+                // Somebody looks at the patch bay.
+                lab.listen(now);
+                return true;
+            }
             stalls.look();
             if (simulator.ticks() % TICKS_PER_LOOK == 0) {
                 lab.listen(now);
@@ -132,7 +145,10 @@ public final class LabDemo {
                 // The operator has started or killed a process.
                 stalls.pause();
             }
-            return !over[0];
+            if (over[0] && options.page()) {
+                timeline.add(now, "demo", "is over; the patch bay stays until Ctrl-C");
+            }
+            return !over[0] || options.page();
         });
         if (!over[0]) {
             throw new DemoFailure("interrupted");

@@ -14,8 +14,10 @@ import tickbus.simulator.Arguments;
  * @param tickbus the tickbus executable
  * @param recording the driver's recording, null for none
  * @param stepNanos simulation step size
+ * @param page true if the dispatcher serves its patch bay, and the board stays after its script
  */
-record LabOptions(Path drivers, Path control, Path programs, Path report, Path tickbus, Path recording, long stepNanos) {
+record LabOptions(Path drivers, Path control, Path programs, Path report, Path tickbus, Path recording, long stepNanos,
+        boolean page) {
     static final String USAGE = """
             usage: demo-lab --drivers DIR --control FILE --programs DIR --report FILE --tickbus FILE [options]
 
@@ -30,6 +32,8 @@ record LabOptions(Path drivers, Path control, Path programs, Path report, Path t
               --recording FILE   where the driver records to ([record] in its .cfg): an HTML page about it is made
                                  beside the report
               --step TIME        simulation step size (default 2ms)
+              --page             the dispatcher serves its patch bay, whose address is printed; after the script
+                                 everything stays until Ctrl-C
 
             The last line is "demo-lab: ok …" with exit code 0, or "demo-lab: failed reason=…" with exit code 1; 2 if
             the command line was wrong, 130 after Ctrl-C.
@@ -37,10 +41,10 @@ record LabOptions(Path drivers, Path control, Path programs, Path report, Path t
 
     static LabOptions read(String[] args) {
         Arguments arguments = new Arguments(args, List.of("--drivers", "--control", "--programs", "--report", "--tickbus",
-                "--recording", "--step"), List.of());
+                "--recording", "--step"), List.of("--page"));
         return new LabOptions(arguments.path("--drivers"), arguments.path("--control"), arguments.path("--programs"),
                 arguments.path("--report"), arguments.path("--tickbus"),
                 arguments.has("--recording") ? arguments.path("--recording") : null,
-                arguments.duration("--step", "2ms"));
+                arguments.duration("--step", "2ms"), arguments.has("--page"));
     }
 }

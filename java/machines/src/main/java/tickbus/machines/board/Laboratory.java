@@ -17,6 +17,9 @@ final class Laboratory implements AutoCloseable {
     /** After this time a process ends on its own, in case nothing else ends it. */
     private static final String LONGEST = "30min";
 
+    /** The same where somebody looks at the page. */
+    private static final String LONGEST_WITH_PAGE = "24h";
+
     private static final long LISTENING_NANOS = 10_000_000_000L;
     private static final Pattern ADDRESS = Pattern.compile("(?m)^(address\\s*=\\s*)\"[^\"]*\"");
     private static final Pattern ENDED = Pattern.compile(".* overtaken=(\\d+) .*");
@@ -27,6 +30,7 @@ final class Laboratory implements AutoCloseable {
     private final Member tanks;
     private final Member panel;
     private String address;
+    private String page;
 
     Laboratory(LabOptions options, Timeline timeline) {
         this.options = options;
@@ -34,6 +38,15 @@ final class Laboratory implements AutoCloseable {
         dispatcher = new Member("dispatcher", "the dispatcher", log("dispatcher.log"));
         tanks = new Member("TANKS", "TANKS", log("tanks.log"));
         panel = new Member("PANEL", "PANEL", log("panel.log"));
+    }
+
+    private String longest() {
+        return options.page() ? LONGEST_WITH_PAGE : LONGEST;
+    }
+
+    /** The address of the patch bay; null without it. */
+    String page() {
+        return page;
     }
 
     private Path log(String name) {
@@ -50,13 +63,18 @@ final class Laboratory implements AutoCloseable {
         Path cfg = options.drivers().resolve("board.cfg");
         try {
             Files.deleteIfExists(patch);
-            dispatcher.start(List.of(options.tickbus().toString(), "dispatch", "--listen", "127.0.0.1:0", "--patch",
-                    patch.toString(), "--duration", LONGEST));
+            List<String> command = new ArrayList<>(List.of(options.tickbus().toString(), "dispatch", "--listen",
+                    "127.0.0.1:0", "--patch", patch.toString(), "--duration", longest()));
+            if (options.page()) {
+                command.addAll(List.of("--page", "127.0.0.1:0"));
+            }
+            dispatcher.start(command);
             long limit = System.nanoTime() + LISTENING_NANOS;
-            while (address == null) {
+            while (address == null || (options.page() && page == null)) {
                 dispatcher.check();
                 dispatcher.listen();
                 address = dispatcher.said("dispatch: listening on ");
+                page = dispatcher.said("dispatch: page at ");
                 if (System.nanoTime() - limit > 0) {
                     throw new DemoFailure("the dispatcher does not listen at any address");
                 }
@@ -91,7 +109,7 @@ final class Laboratory implements AutoCloseable {
         String file = member.name().toLowerCase(Locale.ROOT);
         List<String> command = new ArrayList<>(List.of(options.tickbus().toString(), "logo",
                 options.programs().resolve(file + ".toml").toString(), "--name", member.name(), "--dispatcher", address,
-                "--duration", LONGEST));
+                "--duration", longest()));
         if (patched) {
             command.addAll(List.of("--patch", options.programs().resolve(file + ".patch").toString()));
         }

@@ -1,0 +1,1 @@
+//! The patch bay as a tool: boxes, matrix, history.

@@ -117,13 +117,16 @@ fn patch_bay(patch: &std::path::Path, door: &Door) -> Result<tickbus_patch_bay::
     use tickbus_patch_bay::{LayoutRefused, PatchBay};
 
     let layout = PatchBay::layout_beside(patch);
-    PatchBay::with_layout(door.clone(), &layout, |told| say(&told)).map_err(|refused| match refused {
+    PatchBay::with_layout(door.clone(), &layout, |told| say(&told)).map_err(|refused| match refused
+    {
         LayoutRefused::Mistakes(mistakes) => {
             eprintln!("{mistakes}\ndispatch: failed mistakes={}", mistakes.len());
             Outcome::WrongInput
         }
         LayoutRefused::System(error) => {
-            say(&format!("failed reason=\"the layout cannot be kept: {error}\""));
+            say(&format!(
+                "failed reason=\"the layout cannot be kept: {error}\""
+            ));
             Outcome::BusFailed
         }
     })

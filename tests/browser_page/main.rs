@@ -9,11 +9,11 @@
 #[allow(dead_code, reason = "the report's tests use the rest")]
 mod webdriver;
 
+mod board;
 #[path = "../peers/commands.rs"]
 mod commands;
 #[path = "../peers/edited.rs"]
 mod edited;
-mod board;
 mod live;
 mod room;
 mod run;
@@ -96,6 +96,14 @@ impl Lab {
 
     fn kill(&mut self) {
         self.child.kill().expect("it runs");
+        self.child.wait().expect("it ends");
+    }
+
+    /// Ends it as Ctrl-C does, so that it keeps everything.
+    fn child_ends(&mut self) {
+        let pid = i32::try_from(self.child.id()).expect("a process");
+        let pid = rustix::process::Pid::from_raw(pid).expect("a process");
+        rustix::process::kill_process(pid, rustix::process::Signal::INT).expect("it runs");
         self.child.wait().expect("it ends");
     }
 

@@ -23,12 +23,15 @@ const SHEET: i32 = 1340;
 const HIGHEST: i32 = 1400;
 
 /// The free space beneath a box.
-const BELOW: i32 = 32;
+const BELOW: i32 = 36;
 
 /// The free space beside a box for one cable, and for each further one, up to the widest.
-const BESIDE: i32 = 64;
+const BESIDE: i32 = 60;
 const PER_CABLE: i32 = 7;
-const WIDEST: i32 = 130;
+const WIDEST: i32 = 112;
+
+/// The height of a channel; page.css has the same.
+pub(crate) const ROW: i32 = 30;
 
 /// The sweeps that reduce crossings.
 const SWEEPS: usize = 6;
@@ -89,8 +92,7 @@ fn arrange_part(
     let pairs = links
         .iter()
         .filter_map(|(from, to)| Some((local(*from)?, local(*to)?)));
-    let pairs: BTreeSet<(usize, usize)> = pairs.filter(|(from, to)| from != to).collect();
-    let graph = Graph::new(part.len(), &pairs);
+    let graph = Graph::new(part.len(), pairs.filter(|(from, to)| from != to));
     let columns = graph.columns();
     let heights: Vec<i32> = part.iter().map(|at| sizes[*at].height).collect();
     let columns = divided(columns, &heights);
@@ -101,7 +103,8 @@ fn arrange_part(
     let tallest = tallest.unwrap_or_default();
     let mut x = 0;
     for (place, column) in columns.iter().enumerate() {
-        let mut y = (tallest - height_of(column)) / 2;
+        // Channels beside each other are at the same height.
+        let mut y = (tallest - height_of(column)) / 2 / ROW * ROW;
         for at in column {
             spots[part[*at]] = Spot { x, y };
             y += heights[*at] + BELOW;
@@ -150,7 +153,7 @@ fn divided(columns: Vec<Vec<usize>>, heights: &[i32]) -> Vec<Vec<usize>> {
     all
 }
 
-/// The neighbours of a box.
+/// The neighbours of a box, one for each cable.
 #[derive(Clone, Default)]
 struct Neighbours {
     before: Vec<usize>,
@@ -162,11 +165,11 @@ struct Graph {
 }
 
 impl Graph {
-    fn new(count: usize, pairs: &BTreeSet<(usize, usize)>) -> Self {
+    fn new(count: usize, pairs: impl Iterator<Item = (usize, usize)>) -> Self {
         let mut of = vec![Neighbours::default(); count];
         for (from, to) in pairs {
-            of[*from].after.push(*to);
-            of[*to].before.push(*from);
+            of[from].after.push(to);
+            of[to].before.push(from);
         }
         Self { of }
     }
@@ -399,6 +402,9 @@ mod tests {
 
     #[test]
     fn sources_are_left_of_what_they_feed_also_in_a_cycle() {
+        // Most cables lead from the second box to the first one, one leads back.
+        let spots = arrange(&[BOX; 2], &[(0, 1), (1, 0), (1, 0)]);
+        assert!(spots[1].x < spots[0].x, "{spots:?}");
         // Switches feed a controller, it feeds another one, and that a tank, which answers the first one.
         let links = [(3, 1), (1, 2), (2, 0), (0, 1)];
         let spots = arrange(&[BOX; 4], &links);

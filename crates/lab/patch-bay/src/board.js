@@ -10,7 +10,7 @@ const board = (() => {
   /** On a narrow screen boxes are in one column, in the order of their places. */
   const narrow = matchMedia('(max-width: 640px)');
   /** The space around all boxes. */
-  const MARGIN = 24;
+  const MARGIN = { x: 54, y: 40 };
   /** Boxes by the names of their clients: { element, title, isFolded, pins }. */
   const boxes = new Map();
   /** Drawn channels by their names: { element, text }. */
@@ -158,8 +158,8 @@ const board = (() => {
   function place() {
     for (const [name, box] of boxes) {
       const at = dragged.get(name) ?? lab.places.get(name) ?? { x: 0, y: 0 };
-      box.element.style.setProperty('left', `${at.x + MARGIN}px`);
-      box.element.style.setProperty('top', `${at.y + MARGIN}px`);
+      box.element.style.setProperty('left', `${at.x + MARGIN.x}px`);
+      box.element.style.setProperty('top', `${at.y + MARGIN.y}px`);
       box.element.style.setProperty('order', Math.round(at.y / 40) * 40 + Math.round(at.x / 1000));
     }
     drawSoon();
@@ -232,22 +232,22 @@ const board = (() => {
     // Read the whole layout before writing anything, which would force a new layout.
     const all = rectangles();
     const list = [];
+    const names = drawFrames(all);
     for (const { input, output } of wires.values()) {
       const [source, sink] = [lab.pins.get(output), lab.pins.get(input)];
       const [one, other] = [all.get(source.client), all.get(sink.client)];
       list.push({ key: input, output, from: end(source, one), to: end(sink, other) });
     }
     const room = narrow.matches ? { beside: 0, between: 6 } : { beside: 48, between: 12 };
-    const lines = route.all([...all.values()], list, room);
+    const lines = route.all([...all.values(), ...names], list, room);
     for (const [input, line] of lines) for (const path of wires.get(input).paths) setAttribute(path, 'd', line);
     let [right, bottom] = [0, 0];
     for (const box of all.values()) {
       right = Math.max(right, box.right);
       bottom = Math.max(bottom, box.bottom);
     }
-    sheet.style.setProperty('--width', `${right + MARGIN + 48}px`);
-    sheet.style.setProperty('--height', `${bottom + MARGIN + 24}px`);
-    drawFrames(all);
+    sheet.style.setProperty('--width', `${right + MARGIN.x}px`);
+    sheet.style.setProperty('--height', `${bottom + MARGIN.y}px`);
   }
 
   /** The members of each group. */
@@ -260,7 +260,9 @@ const board = (() => {
     return all;
   }
 
+  /** Draws the frames of groups; returns the rectangles of their names, which cables must not cross. */
   function drawFrames(all) {
+    const names = [];
     const wanted = narrow.matches ? new Map() : groups();
     for (const frame of [...frames.children]) if (!wanted.has(frame.dataset.group)) frame.remove();
     for (const [group, members] of wanted) {
@@ -281,7 +283,9 @@ const board = (() => {
       set('top', top - 22);
       set('width', right - left + 20);
       set('height', bottom - top + 32);
+      names.push({ left, top: top - 32, right: left + frame.firstChild.offsetWidth, bottom: top - 10 });
     }
+    return names;
   }
 
   const loose = document.createElementNS(SVG, 'path');

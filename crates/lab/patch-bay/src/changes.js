@@ -93,7 +93,7 @@ const changes = (() => {
     }
     const facts = word === 'undo' ? last.facts.slice().reverse() : last.facts;
     if (why) {
-      say(`Cannot ${word} "${last.text}" ${why}: somebody else has changed it. Nothing was changed.`, true);
+      say(`Cannot ${word} "${last.text.replace(/\.$/, '')}": ${why}, because somebody else has changed it. Nothing was changed.`, true);
       from.pop();
     } else if (await make(facts, there)) {
       from.pop();

@@ -4,7 +4,7 @@
 const layout = (() => {
   const get = (id) => document.getElementById(id);
   /** Boxes are placed on this grid; an arrow key moves one by two steps. */
-  const GRID = 8;
+  const GRID = 10;
   /** After this time without an arrow key, the place is kept. */
   const REST = 500;
   const chosen = new Set();
@@ -163,7 +163,7 @@ const layout = (() => {
       get('group-name').focus();
       return;
     }
-    changes.place(`Grouped ${chosen.size} as ${group}.`, [...chosen].map((name) => [name, { group }]));
+    changes.place(`Grouped ${chosen.size === 1 ? '1 box' : `${chosen.size} boxes`} as ${group}.`, [...chosen].map((name) => [name, { group }]));
     letGo();
   });
   get('ungroup').addEventListener('click', () => {

@@ -7,7 +7,7 @@ use serde_json::Value;
 use tickbus_base::time::Nanos;
 use tickbus_dispatcher::{Channel, ClientState, Label, Pin};
 
-use crate::arrange::{Placed, Size, Spot, arrange, beside, under};
+use crate::arrange::{Placed, ROW, Size, Spot, arrange, beside, under};
 use crate::layout_file::LayoutFile;
 
 /// For this long a client that has come is placed again when its connections change: it states them after its name.
@@ -24,10 +24,9 @@ const MOST: usize = 20_000;
 pub(crate) const FARTHEST: i32 = 1_000_000;
 
 /// The sizes of a box, in pixels; page.css has the same.
-const WIDTH: i32 = 232;
-const NAMED_WIDTH: i32 = 340;
+const WIDTH: i32 = 208;
+const NAMED_WIDTH: i32 = 352;
 const HEADER: i32 = 44;
-const ROW: i32 = 30;
 const PADDING: i32 = 10;
 
 /// What the size of a box depends on.

@@ -1,0 +1,157 @@
+"use strict";
+
+// The page's controller: receives the states of the nets, lists them, and shows one. The page changes nothing.
+(() => {
+  const { make, write } = elements;
+  const get = (id) => document.getElementById(id);
+  /** Nets in which nothing has fired for this long wait, in microseconds. */
+  const PATIENCE = 3_000_000;
+  /** The programs with nets on this page, by their numbers. */
+  let sets = new Map();
+  /** The page of the process that these numbers are from. */
+  let run = null;
+  let view = null;
+  let isHeld = false;
+  let isOld = true;
+  let latest = null;
+  /** The layouts that are being fetched. */
+  const asked = new Set();
+
+  const all = () => [...sets.values()].flatMap((set) => set.nets);
+
+  /** Takes the nets of a program: `layout` is what the program has handed over. */
+  function build({ id, title }, layout) {
+    const set = { id, title, dots: layout.dots, nets: [], byName: new Map() };
+    set.nets = layout.nets.map((net, number) => new nets.Net(set, number, net));
+    set.byName = new Map(set.nets.map((net) => [net.name, net]));
+    sets.set(id, set);
+    sets = new Map([...sets].sort(([one], [other]) => one - other));
+    list();
+  }
+
+  /** Makes the list of nets. */
+  function list() {
+    get("sets").replaceChildren();
+    for (const set of sets.values()) {
+      if (sets.size > 1) make("h3", "", get("sets"), set.title);
+      const items = make("ul", "", get("sets"));
+      for (const net of set.nets) {
+        const button = make("button", "", make("li", "", items));
+        button.type = "button";
+        make("span", "name", button, net.name);
+        net.entry = { button, tag: make("span", "tag", button), why: make("span", "why", button) };
+        button.addEventListener("click", () => {
+          get("follow").checked = false;
+          choose(net);
+          update();
+        });
+      }
+    }
+    const title = sets.size === 1 ? sets.values().next().value.title : "Petri nets";
+    write(get("title"), title);
+    document.title = title;
+    get("choice").hidden = all().length < 2;
+  }
+
+  function choose(net) {
+    view = new netView.View(net);
+    for (const other of all()) {
+      if (other === net) other.entry.button.setAttribute("aria-current", "true");
+      else other.entry.button.removeAttribute("aria-current");
+    }
+  }
+
+  /** Shows the present states. */
+  function update() {
+    const every = all();
+    get("main").hidden = every.length === 0;
+    get("none").hidden = every.length > 0 || latest === null || latest.sets.length > 0;
+    if (!every.length) return;
+    const cause = nets.cause(every, PATIENCE);
+    for (const net of every) {
+      const [words, kind] = net.mark();
+      const { button, tag, why } = net.entry;
+      write(tag, words);
+      tag.className = `tag ${kind}`;
+      write(why, net.why());
+      button.classList.toggle("is-cause", net === cause && every.length > 1);
+    }
+    const scanned = every.find((net) => net.state?.scans && !net.isStill);
+    if (!view || !every.includes(view.net)) choose(cause ?? scanned ?? every[0]);
+    else if (get("follow").checked && cause && cause !== view.net) choose(cause);
+    // A net that is scanned says more than one that is not.
+    else if (get("follow").checked && scanned && !view.net.state) choose(scanned);
+    view.update(performance.now());
+    const note = every.map((net) => net.state?.note).find(Boolean) ?? "";
+    get("line-note").hidden = !note;
+    write(get("line-note"), note);
+    document.body.dataset.shown = String(Number(document.body.dataset.shown ?? 0) + 1);
+  }
+
+  async function fetchLayout(one) {
+    const key = `${run}/${one.id}`;
+    if (asked.has(key)) return;
+    asked.add(key);
+    const here = run;
+    try {
+      // A large layout takes its time.
+      const answer = await fetch(`${room.base}/layout/${one.id}`, { signal: AbortSignal.timeout(60000) });
+      if (answer.ok && here === run) build(one, await answer.json());
+    } catch {
+      // It is asked for again with the next state.
+    }
+    asked.delete(key);
+    if (latest) display(latest);
+  }
+
+  function display(state) {
+    if (state.run !== run) {
+      // Another process has started, perhaps with other nets.
+      run = state.run;
+      sets = new Map();
+      view = null;
+    }
+    const gone = [...sets.keys()].filter((id) => !state.sets.some((set) => set.id === id));
+    gone.forEach((id) => sets.delete(id));
+    if (gone.length) list();
+    for (const one of state.sets) {
+      const set = sets.get(one.id);
+      if (set) set.nets.forEach((net, i) => net.take(one.nets?.[i] ?? null, one.age * 1000));
+      else if (one.drawn) fetchLayout(one);
+    }
+    update();
+  }
+
+  function say() {
+    const [words, kind] = isOld ? ["no connection", "bad"] : isHeld ? ["held still", "stale"] : ["live", "good"];
+    write(get("link"), words);
+    get("link").className = `tag ${kind}`;
+  }
+
+  get("hold").addEventListener("click", () => {
+    isHeld = !isHeld;
+    get("hold").setAttribute("aria-pressed", String(isHeld));
+    if (!isHeld && latest) display(latest);
+    say();
+  });
+  get("full").addEventListener("click", () => {
+    const isFull = document.body.classList.toggle("is-full");
+    get("full").setAttribute("aria-pressed", String(isFull));
+  });
+  setInterval(() => view?.fade(performance.now()), 200);
+  tabs.show();
+  room.listen({
+    news(text) {
+      latest = JSON.parse(text);
+      if (!isHeld || latest.run !== run) display(latest);
+    },
+    access() {},
+    age(isNowOld, seconds) {
+      isOld = isNowOld;
+      document.body.classList.toggle("is-old", isOld);
+      get("age").hidden = !isOld || !latest;
+      if (isOld && latest) write(get("age"), `Nothing heard for ${seconds} s: this is how it was then.`);
+      say();
+    },
+  });
+})();

@@ -67,6 +67,9 @@ enum tb_status {
 /* An open driver. Never 0. */
 typedef int64_t tb_driver;
 
+/* Nets on the page. Never 0. */
+typedef int64_t tb_nets;
+
 /* A value: a double, or an integer for a signal of a 64-bit integer type without scale. */
 typedef union tb_slot {
     double real;
@@ -217,6 +220,28 @@ TB_IMPORT int32_t tb_faults(tb_driver driver, char *text, size_t room);
 /* Writes the address of the driver's live page; "" if driver.cfg has no [page]. The address contains the token that permits
  * forcing signals: pass it on with care. Returns as tb_statistics does. */
 TB_IMPORT int32_t tb_page(tb_driver driver, char *text, size_t room);
+
+/* Petri nets that this process runs, on its live page: docs/petri.md describes the page and the JSON. tb_nets_open shows nets under a
+ * heading. The page is that of the drivers if one of them has a page; otherwise it is served at `address`, such as "127.0.0.1:8080"
+ * for this computer alone; port 0 lets the system choose. Sets *nets to a handle, or to 0 on failure. Any thread may call these
+ * functions. */
+TB_IMPORT int32_t tb_nets_open(const char *address, const char *title, tb_nets *nets);
+
+/* Writes the address of the page with the nets. It has no token: the page of nets only shows. Returns as tb_statistics does. */
+TB_IMPORT int32_t tb_nets_page(tb_nets nets, char *text, size_t room);
+
+/* Hands over the names, conditions and drawings of the nets as JSON, once. TB_BAD_ARGUMENT: tb_last_error says where it is wrong. */
+TB_IMPORT int32_t tb_nets_draw(tb_nets nets, const char *json);
+
+/* Returns 1 if a state is wanted: somebody looks, and the last state is 33 ms old. Otherwise waits for that, at most `patience`
+ * nanoseconds, and returns 0 if it was in vain; or returns a status below 0. With 0 it never waits. */
+TB_IMPORT int32_t tb_nets_wanted(tb_nets nets, int64_t patience);
+
+/* Hands over the present states of the nets as JSON. Viewers never make the caller wait. */
+TB_IMPORT int32_t tb_nets_put(tb_nets nets, const char *json);
+
+/* Takes the nets from the page. A tb_nets_wanted of another thread returns 0. */
+TB_IMPORT int32_t tb_nets_close(tb_nets nets);
 
 /* Returns 1 once the bus has ended the run on its own, as virtual time does: further ticks bring stale values. Returns 0 before
  * that, or a status below 0. */

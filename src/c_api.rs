@@ -9,6 +9,7 @@
 )]
 
 mod many;
+mod nets;
 
 use std::cell::{Cell, RefCell};
 use std::collections::HashSet;

@@ -11,6 +11,7 @@
 
 mod failure;
 mod many;
+mod nets;
 mod open;
 mod sweep;
 

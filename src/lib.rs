@@ -37,7 +37,7 @@
 //! | [`virtual_time`] | lock-step by virtual time (SDSP): server, clients, trace hash |
 //! | [`federation`] | a federation of another engine as a client of a run |
 //! | [`gateway`] | a real PLC, on its own bus, as a client of a run |
-//! | `jni` | the native methods of the Java classes `tickbus.Tickbus`, `DriverVector` and `SweepSession` |
+//! | `jni` | the native methods of the Java classes `tickbus.Tickbus`, `DriverVector`, `SweepSession` and `LiveNets` |
 //! | `c_api` | the functions of `include/tickbus.h` |
 //! | `fmi_api` | the functions of FMI, for the FMU made from a driver.cfg |
 //! | [`cli`] | the `tickbus` command |
@@ -53,6 +53,8 @@ pub mod fieldbus;
 mod fmi_api;
 #[cfg(feature = "doors")]
 mod jni;
+#[cfg(feature = "doors")]
+mod nets;
 /// The live page of this process, for the Python package.
 #[doc(hidden)]
 pub mod page;

@@ -12,6 +12,11 @@ pub(crate) use none::{show, show_run};
 #[cfg(feature = "page")]
 pub(crate) use open::{options, picture_at, show, show_recording, show_run};
 
+#[cfg(all(feature = "doors", not(feature = "page")))]
+pub(crate) use none::{NetsPlace, show_nets};
+#[cfg(all(feature = "doors", feature = "page"))]
+pub(crate) use open::{NetsPlace, show_nets};
+
 #[cfg(not(feature = "page"))]
 pub use none::{Place, url};
 #[cfg(feature = "page")]

@@ -1,5 +1,7 @@
 //! A build without pages.
 
+#[cfg(feature = "doors")]
+use tickbus_base::time::Nanos;
 use tickbus_driver::Watch;
 use tickbus_net::Address;
 use tickbus_virtual_time::Controls;
@@ -41,6 +43,41 @@ pub(crate) fn show_run(
 ) -> Result<Place, PageError> {
     let text = "this tickbus was built without live pages; build it with --features page, or leave out --page";
     Err(PageError::Unsupported(text.to_owned()))
+}
+
+/// The place of nets on the page; without pages there is none.
+#[cfg(feature = "doors")]
+#[derive(Debug)]
+pub(crate) enum NetsPlace {}
+
+/// Returns an error: this build has no pages.
+#[cfg(feature = "doors")]
+pub(crate) fn show_nets(_title: &str, _listen: &Address) -> Result<NetsPlace, PageError> {
+    let text = "this tickbus was built without live pages; build it with --features page";
+    Err(PageError::Unsupported(text.to_owned()))
+}
+
+#[cfg(feature = "doors")]
+impl NetsPlace {
+    pub(crate) fn url(&self) -> String {
+        match *self {}
+    }
+
+    pub(crate) fn draw(&self, _json: &str) -> Result<(), String> {
+        match *self {}
+    }
+
+    pub(crate) fn wanted(&self, _patience: Nanos) -> bool {
+        match *self {}
+    }
+
+    pub(crate) fn put(&self, _json: &str) -> Result<(), String> {
+        match *self {}
+    }
+
+    pub(crate) fn leave(&self) {
+        match *self {}
+    }
 }
 
 /// Returns `None`: there is no page.

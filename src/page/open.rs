@@ -1,18 +1,22 @@
-//! The page that is served: opened for the first driver that asks for one, and closed with the last.
+//! The pages that are served: opened for the first driver, or the first nets, that ask for one, and closed with the last.
 
 use std::fs;
 use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
 use tickbus_base::time::Monotonic;
+#[cfg(feature = "doors")]
+use tickbus_base::time::Nanos;
 use tickbus_driver::{Line, Watch};
 use tickbus_driver_cfg::Config;
 use tickbus_live_page::picture::{self, Picture};
 use tickbus_live_page::{LivePage, Member, Options, Recorded};
 use tickbus_net::Address;
+#[cfg(feature = "doors")]
+use tickbus_net_page::{NetPage, Nets, Wanted};
 use tickbus_studio::{Running, Seat};
 use tickbus_virtual_time::Controls;
-use tickbus_web::{Limits, Pages, Room, Serving};
+use tickbus_web::{Joined, Limits, Page, Pages, Room, Serving};
 
 use super::{PageError, Read, Shown};
 
@@ -27,8 +31,12 @@ const LARGEST: u64 = 16 << 20;
 struct Open {
     // Dropped in this order, so that nobody asks a page that has ended.
     _serving: Serving,
-    page: LivePage,
     pages: Pages,
+    /// The live page, while it has members.
+    live: Mutex<Weak<Tab<LivePage>>>,
+    /// The page of nets, while there are any.
+    #[cfg(feature = "doors")]
+    nets: Mutex<Weak<Tab<NetPage>>>,
     /// True if only this computer reaches the page.
     is_here: bool,
     url: String,
@@ -36,11 +44,38 @@ struct Open {
     asked: Address,
 }
 
+/// One of the served pages.
+#[derive(Debug)]
+struct Tab<T> {
+    // Dropped in this order, so that nobody asks a page that has ended.
+    joined: Joined,
+    page: T,
+}
+
+/// Returns the present page, or a new one that joins the others, and whether it is new.
+fn tab<T>(
+    present: &Mutex<Weak<Tab<T>>>,
+    join: impl FnOnce() -> std::io::Result<(Joined, T)>,
+) -> Result<(Arc<Tab<T>>, bool), PageError> {
+    // The value is only ever replaced as a whole.
+    let mut present = present.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(tab) = present.upgrade() {
+        return Ok((tab, false));
+    }
+    let joined = join();
+    let (joined, page) =
+        joined.map_err(|error| PageError::NotServed(format!("the page cannot begin: {error}")))?;
+    let tab = Arc::new(Tab { joined, page });
+    *present = Arc::downgrade(&tab);
+    Ok((tab, true))
+}
+
 /// The place of a driver or a run on the page.
 #[derive(Debug)]
 pub struct Place {
     seat: Option<Seat>,
     member: Option<Member>,
+    live: Option<Arc<Tab<LivePage>>>,
     open: Option<Arc<Open>>,
 }
 
@@ -50,6 +85,7 @@ impl Drop for Place {
         let present = present();
         self.seat = None;
         self.member = None;
+        self.live = None;
         self.open = None;
         drop(present);
     }
@@ -79,12 +115,13 @@ pub(crate) fn show(
     let any = "listen = \"127.0.0.1:0\" in [page], or --page 127.0.0.1:0,";
     let token = wanted.token_file.as_ref();
     let token = token.map(|file| config.folder().join(file));
-    let (open, is_new) = open(&config.name, (&wanted.listen, any), token.as_deref())?;
+    let open = open(&config.name, (&wanted.listen, any), token.as_deref())?;
+    let (live, is_new) = open.live()?;
     let Some(watch) = (shown.watch)() else {
         return Ok(None);
     };
     let present = Arc::clone(watch.config());
-    let member = open.page.join(watch, options);
+    let member = live.page.join(watch, options);
     let seat = match shown.read.filter(|_| wanted.edit) {
         Some(read) => Some(open.edit(&member, present, (shown.line, read))?),
         None => None,
@@ -96,11 +133,26 @@ pub(crate) fn show(
     Ok(Some(Place {
         seat,
         member: Some(member),
+        live: Some(live),
         open: Some(open),
     }))
 }
 
 impl Open {
+    /// Returns the live page, and whether it is new.
+    fn live(&self) -> Result<(Arc<Tab<LivePage>>, bool), PageError> {
+        tab(&self.live, || {
+            let page = LivePage::open(Monotonic::shared())?;
+            let joined = self.pages.join(Page::new("Live page", "/", page.site()));
+            Ok((joined, page))
+        })
+    }
+
+    /// The address without the token.
+    fn plain_url(&self) -> &str {
+        self.url.split_once('#').map_or(&self.url, |(plain, _)| plain)
+    }
+
     /// Opens the studio of a driver.
     fn edit(
         &self,
@@ -146,16 +198,78 @@ pub(crate) fn show_run(
     controls: Controls,
     announce: impl FnOnce(&str),
 ) -> Result<Place, PageError> {
-    let (open, is_new) = open(name, (listen, "--page 127.0.0.1:0"), None)?;
-    let member = open.page.join_run(name, controls);
+    let open = open(name, (listen, "--page 127.0.0.1:0"), None)?;
+    let (live, is_new) = open.live()?;
+    let member = live.page.join_run(name, controls);
     if is_new {
         announce(&open.url);
     }
     Ok(Place {
         seat: None,
         member: Some(member),
+        live: Some(live),
         open: Some(open),
     })
+}
+
+/// The place of a program's nets on their page.
+#[cfg(feature = "doors")]
+#[derive(Debug)]
+pub(crate) struct NetsPlace {
+    nets: Nets,
+    url: String,
+    /// `None` after the nets have left.
+    held: Mutex<Option<(Arc<Tab<NetPage>>, Arc<Open>)>>,
+}
+
+/// Shows nets on a page, which is served at `listen` unless this process has pages already.
+#[cfg(feature = "doors")]
+pub(crate) fn show_nets(title: &str, listen: &Address) -> Result<NetsPlace, PageError> {
+    let open = open(title, (listen, "127.0.0.1:0"), None)?;
+    let (tab, _) = tab(&open.nets, || {
+        let page = NetPage::new(Monotonic::shared());
+        let joined = open.pages.join(Page::new("Nets", "/nets", page.site()));
+        Ok((joined, page))
+    })?;
+    let address = open.plain_url().trim_end_matches('/');
+    Ok(NetsPlace {
+        nets: tab.page.join(title),
+        url: format!("{address}{}", tab.joined.path()),
+        held: Mutex::new(Some((tab, open))),
+    })
+}
+
+#[cfg(feature = "doors")]
+impl NetsPlace {
+    /// The address of the page. It has no token, because nothing can be changed there.
+    pub(crate) fn url(&self) -> String {
+        self.url.clone()
+    }
+
+    /// Hands over the drawings.
+    pub(crate) fn draw(&self, json: &str) -> Result<(), String> {
+        self.nets.draw(json)
+    }
+
+    /// Waits until a state is wanted, at most this long.
+    pub(crate) fn wanted(&self, patience: Nanos) -> bool {
+        self.nets.wanted(patience) == Wanted::Yes
+    }
+
+    /// Hands over a state.
+    pub(crate) fn put(&self, json: &str) -> Result<(), String> {
+        self.nets.put(json)
+    }
+
+    /// Takes the nets from the page, also while another thread waits.
+    pub(crate) fn leave(&self) {
+        self.nets.leave();
+        // Locked so that nobody asks for the address while it is being released.
+        let present = present();
+        let held = self.held.lock().unwrap_or_else(PoisonError::into_inner).take();
+        drop(held);
+        drop(present);
+    }
 }
 
 /// Shows a recording on a page at `listen` until the returned place is dropped; `announce` receives the address.
@@ -164,25 +278,26 @@ pub(crate) fn show_recording(
     listen: &Address,
     announce: impl FnOnce(&str),
 ) -> Result<Place, PageError> {
-    let (open, _) = open("recording", (listen, "--page 127.0.0.1:0"), None)?;
-    let member = open.page.join_recording(recorded);
+    let open = open("recording", (listen, "--page 127.0.0.1:0"), None)?;
+    let (live, _) = open.live()?;
+    let member = live.page.join_recording(recorded);
     // Nothing can be forced, so nobody needs the token.
-    let (plain, _) = open.url.split_once('#').unwrap_or((&open.url, ""));
-    announce(plain);
+    announce(open.plain_url());
     Ok(Place {
         seat: None,
         member: Some(member),
+        live: Some(live),
         open: Some(open),
     })
 }
 
-/// Returns the present page, or a new one at `asked`, and whether it is new; `any` is the setting for a port that the system chooses, for the
+/// Returns the present room, or a new one at `asked`; `any` is the setting for a port that the system chooses, for the
 /// error message.
 fn open(
     name: &str,
     (asked, any): (&Address, &str),
     token_file: Option<&Path>,
-) -> Result<(Arc<Open>, bool), PageError> {
+) -> Result<Arc<Open>, PageError> {
     let mut present = present();
     if let Some(open) = present.upgrade() {
         if open.asked != *asked {
@@ -191,7 +306,7 @@ fn open(
                 open.asked
             );
         }
-        return Ok((open, false));
+        return Ok(open);
     }
     let refused = |error: std::io::Error| {
         PageError::NotServed(format!(
@@ -205,23 +320,23 @@ fn open(
             .map_err(|error| PageError::NotServed(format!("the page has no token: {error}")))?;
     }
     let url = room.url();
-    let page = LivePage::open(Monotonic::shared()).map_err(refused)?;
-    let pages = Pages::of("Live page", page.site());
+    let pages = Pages::default();
     let is_here = room.address().ip().is_loopback();
     let serving = room.serve(pages.clone(), Monotonic::shared());
     let open = Arc::new(Open {
         _serving: serving.map_err(refused)?,
-        page,
         pages,
+        live: Mutex::default(),
+        #[cfg(feature = "doors")]
+        nets: Mutex::default(),
         is_here,
         url,
         asked: asked.clone(),
     });
     *present = Arc::downgrade(&open);
     // Readers of the log must not be able to force signals: only whoever started this process gets the token.
-    let (plain, _) = open.url.split_once('#').unwrap_or((&open.url, ""));
-    log::info!("the live page is at {plain}");
-    Ok((open, true))
+    log::info!("the live page is at {}", open.plain_url());
+    Ok(open)
 }
 
 /// Reads the picture of a driver. Mistakes in it are logged, and the rest of the picture works.

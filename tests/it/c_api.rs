@@ -165,6 +165,15 @@ fn a_line_takes_the_changes_of_its_file() {
 }
 
 #[test]
+#[cfg(feature = "page")]
+fn nets_are_shown_and_wrong_ones_are_explained() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let program = compile(&["cc", "-std=c99"], "tests/c/nets.c", folder.path());
+    let output = run(&program, folder.path(), &[]);
+    assert!(output.status.success(), "{output:?}");
+}
+
+#[test]
 fn a_loop_learns_that_the_run_is_over() {
     let folder = folder_with_tank();
     let program = compile(&["cc", "-std=c99"], "tests/c/over.c", folder.path());

@@ -41,6 +41,8 @@ fn the_native_methods_of_tickbus_are_exported() {
         "Java_tickbus_ModelFaults_declareNative",
         "Java_tickbus_ModelFaults_takeNative",
         "Java_tickbus_Tickbus_reportNative",
+        "Java_tickbus_LiveNets_openNative",
+        "Java_tickbus_LiveNets_wantedNative",
         "Java_tickbus_SweepSession_openNative",
         "Java_tickbus_SweepSession_afterNative",
     ] {

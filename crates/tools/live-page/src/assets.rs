@@ -37,7 +37,7 @@ pub(crate) const ASSETS: &[Asset] = &[
     },
     script("/lookup.js", tickbus_report::LOOKUP),
     script("/draw.js", tickbus_report::DRAW),
-    script("/elements.js", include_str!("elements.js")),
+    script("/elements.js", tickbus_web::ELEMENTS),
     script("/signals.js", include_str!("signals.js")),
     script("/trend.js", include_str!("trend.js")),
     script("/list.js", include_str!("list.js")),

@@ -12,8 +12,9 @@
   let run = null;
   let view = null;
   let isHeld = false;
-  let isOld = true;
   let latest = null;
+  /** What holds for all nets of a scan, such as that the line is stale. */
+  const sayNote = head.alarm("line-note", "stale");
   /** The layouts that are being fetched. */
   const asked = new Set();
 
@@ -48,8 +49,7 @@
       }
     }
     const title = sets.size === 1 ? sets.values().next().value.title : "Petri nets";
-    write(get("title"), title);
-    document.title = title;
+    head.title(title, title);
     get("choice").hidden = all().length < 2;
   }
 
@@ -83,8 +83,7 @@
     else if (get("follow").checked && scanned && !view.net.state) choose(scanned);
     view.update(performance.now());
     const note = every.map((net) => net.state?.note).find(Boolean) ?? "";
-    get("line-note").hidden = !note;
-    write(get("line-note"), note);
+    sayNote(note);
     document.body.dataset.shown = String(Number(document.body.dataset.shown ?? 0) + 1);
   }
 
@@ -122,36 +121,26 @@
     update();
   }
 
-  function say() {
-    const [words, kind] = isOld ? ["no connection", "bad"] : isHeld ? ["held still", "stale"] : ["live", "good"];
-    write(get("link"), words);
-    get("link").className = `tag ${kind}`;
-  }
-
   get("hold").addEventListener("click", () => {
     isHeld = !isHeld;
     get("hold").setAttribute("aria-pressed", String(isHeld));
     if (!isHeld && latest) display(latest);
-    say();
+    head.showLink();
   });
   get("full").addEventListener("click", () => {
     const isFull = document.body.classList.toggle("is-full");
     get("full").setAttribute("aria-pressed", String(isFull));
   });
   setInterval(() => view?.fade(performance.now()), 200);
-  tabs.show();
-  room.listen({
+  head.listen({
+    may: "only shows",
+    mayNot: "",
+    lost: "No connection to the nets.",
+    link: () => (isHeld ? ["held still", "stale"] : null),
     news(text) {
       latest = JSON.parse(text);
       if (!isHeld || latest.run !== run) display(latest);
     },
     access() {},
-    age(isNowOld, seconds) {
-      isOld = isNowOld;
-      document.body.classList.toggle("is-old", isOld);
-      get("age").hidden = !isOld || !latest;
-      if (isOld && latest) write(get("age"), `Nothing heard for ${seconds} s: this is how it was then.`);
-      say();
-    },
   });
 })();

@@ -35,5 +35,8 @@ pub const STREAM: &str = include_str!("stream.js");
 /// the element `top`. A page has `stream.js`, `client.js` and this before its own script, and calls `head.listen`.
 pub const HEAD: &str = include_str!("head.js");
 
+/// The script with which those of the pages make elements; they expect it at `/elements.js`.
+pub const ELEMENTS: &str = include_str!("elements.js");
+
 /// The style of that head; it follows `report.css`, which has the colours.
 pub const STYLE: &str = include_str!("room.css");

@@ -170,6 +170,14 @@ impl Pages {
         (rest == "/").then_some(site)
     }
 
+    /// The path of the page to open where there is none at `/`.
+    pub(crate) fn instead_of_first(&self) -> Option<String> {
+        let entries = self.entries();
+        let has_first = entries.iter().any(|entry| entry.path.is_empty());
+        let other = entries.first().filter(|_| !has_first);
+        other.map(|entry| entry.path.clone())
+    }
+
     /// The file for a path: of its page, or of any.
     pub(crate) fn asset(&self, path: &str) -> Option<Asset> {
         let of = |site: &dyn Site, path: &str| {

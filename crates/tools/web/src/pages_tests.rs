@@ -57,6 +57,17 @@ fn toy(files: &[(&'static str, &'static str)]) -> Arc<Toy> {
     })
 }
 
+#[test]
+fn a_room_without_a_first_page_leads_to_another_one() {
+    let pages = Pages::default();
+    assert_eq!(pages.instead_of_first(), None);
+    let _nets = pages.join(Page::new("Nets", "/nets", toy(&[])));
+    let _board = pages.join(Page::new("Board", "/board", toy(&[])));
+    assert_eq!(pages.instead_of_first().as_deref(), Some("/nets"));
+    let _first = pages.join(Page::new("Live page", "/", toy(&[])));
+    assert_eq!(pages.instead_of_first(), None);
+}
+
 fn put(pages: &Pages, path: &str) {
     let change = Change {
         verb: Verb::Put,

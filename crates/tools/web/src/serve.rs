@@ -10,7 +10,7 @@ use http_body_util::combinators::UnsyncBoxBody;
 use http_body_util::{BodyExt as _, Full, Limited, StreamBody};
 use hyper::body::{Bytes, Incoming};
 use hyper::header::{
-    ALLOW, CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, HeaderName, HeaderValue,
+    ALLOW, CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, HeaderName, HeaderValue, LOCATION,
     REFERRER_POLICY, X_CONTENT_TYPE_OPTIONS,
 };
 use hyper::{Method, Request, Response, StatusCode};
@@ -184,6 +184,9 @@ async fn get(
             if let Some(asset) = hall.pages.asset(path) {
                 return Ok(full(asset.kind, asset.text));
             }
+            if let Some(other) = hall.pages.instead_of_first().filter(|_| path == "/") {
+                return Ok(see_other(&other));
+            }
             if hall.pages.is_private(path) && token != Token::Right {
                 return Err(no_token(token));
             }
@@ -226,6 +229,16 @@ async fn body(hall: &Hall, request: Request<Incoming>, longest: usize) -> Result
     let text = String::from_utf8(body.to_bytes().into());
     let text = text.map_err(|_| (StatusCode::BAD_REQUEST, "the body is not UTF-8".to_owned()))?;
     Ok(text.trim().to_owned())
+}
+
+fn see_other(path: &str) -> Response<Body> {
+    let mut response = full(JSON, "{}\n".to_owned());
+    *response.status_mut() = StatusCode::SEE_OTHER;
+    // A path that is no header leads nowhere.
+    if let Ok(path) = HeaderValue::from_str(path) {
+        response.headers_mut().insert(LOCATION, path);
+    }
+    response
 }
 
 fn no_token(token: Token) -> Refusal {

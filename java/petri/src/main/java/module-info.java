@@ -1,7 +1,8 @@
 /** Petri nets; start at {@link tickbus.petri.net.PetriNet}. */
 module org.tickbus.petri {
     requires java.xml;
-    requires jdk.httpserver;
+    // For the page alone.
+    requires static org.tickbus;
 
     exports tickbus.petri.analysis;
     exports tickbus.petri.draw;

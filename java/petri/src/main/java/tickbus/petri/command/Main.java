@@ -104,7 +104,7 @@ public final class Main {
             err.println(e.getFile() + ": there is no such file");
         } catch (IOException e) {
             err.println(e.getMessage() == null ? e.toString() : e.getMessage());
-        } catch (NetException | IllegalArgumentException e) {
+        } catch (NetException | IllegalArgumentException | IllegalStateException e) {
             err.println(e.getMessage());
         }
         return WRONG;

@@ -1,5 +1,9 @@
 package tickbus.petri.draw;
 
+import java.io.IOException;
+import java.io.InputStream;
+import java.io.UncheckedIOException;
+import java.nio.charset.StandardCharsets;
 import java.util.Arrays;
 import java.util.List;
 import tickbus.petri.net.Arc;
@@ -22,25 +26,7 @@ public final class NetSvg {
     /** x and y of the dots of 0 to 5 tokens, from the middle of the place. */
     static final int[][] DOTS = {{}, {0, 0}, {-6, 0, 6, 0}, {-6, 5, 6, 5, 0, -6}, {-6, -6, 6, -6, -6, 6, 6, 6},
         {-7, -7, 7, -7, -7, 7, 7, 7, 0, 0}};
-    static final String STYLE = """
-        .net{--ink:#1a1d21;--soft:#565d66;--page:#ffffff;--card:#f6f7f8;--go:#1f5f99;--tint:#d3e4f3}
-        @media screen and (prefers-color-scheme:dark){.net{--ink:#e7eaee;--soft:#a3abb5;--page:#14171a;--card:#1d2126;\
-        --go:#79b4ea;--tint:#1f3a54}}
-        .net text{font:12px system-ui,sans-serif;fill:var(--ink);stroke:var(--page);stroke-width:3px;paint-order:stroke}
-        .net .net-number{font-weight:600;text-anchor:middle;stroke:none}
-        .net .net-place circle{fill:var(--card);stroke:var(--ink);stroke-width:1.5}
-        .net .net-place .net-dot{fill:var(--ink);stroke:none}
-        .net .net-bar{fill:var(--ink);stroke:var(--ink);stroke-width:1.5}
-        .net .net-timed .net-bar{fill:var(--card)}
-        .net .net-frame{fill:none;stroke:none}
-        .net .net-enabled .net-bar{fill:var(--go);stroke:var(--go)}
-        .net .net-enabled.net-timed .net-bar{fill:var(--tint)}
-        .net .net-enabled .net-frame{stroke:var(--go);stroke-width:1.5}
-        .net .net-arc{fill:none;stroke:var(--soft);stroke-width:1.25}
-        .net .net-test{stroke-dasharray:5 3}
-        .net .net-head{fill:var(--soft)}
-        .net .net-ring{fill:var(--page);stroke:var(--soft);stroke-width:1.25}
-        """;
+    static final String STYLE = style("net.css");
     private static final double HEAD = 8;
     private static final double RING = 4;
 
@@ -73,6 +59,14 @@ public final class NetSvg {
     /** The style of all drawings, as CSS. */
     public static String style() {
         return STYLE;
+    }
+
+    private static String style(String file) {
+        try (InputStream in = NetSvg.class.getResourceAsStream(file)) {
+            return new String(in.readAllBytes(), StandardCharsets.UTF_8);
+        } catch (IOException e) {
+            throw new UncheckedIOException(e);
+        }
     }
 
     /** The dots of few tokens, for views that change the marking: x and y of each, by the number of tokens. */

@@ -1,14 +1,19 @@
 package tickbus.petri.page;
 
-import java.nio.charset.StandardCharsets;
+import java.io.IOException;
+import java.net.URI;
 import java.util.ArrayList;
-import java.util.Arrays;
 import java.util.List;
+import tickbus.FieldbusException;
+import tickbus.LiveNets;
+import tickbus.Status;
 import tickbus.petri.run.NetWatch;
 import tickbus.petri.run.RunningNet;
 
-/** The newest state, updated while somebody watches. Slow viewers miss intermediate states, and make nobody wait. */
-final class Feed implements Runnable {
+/** Hands over the nets and their states while somebody looks, until they are taken from the page. */
+final class Feed {
+    private static final long PATIENCE_NANOS = 1_000_000_000;
+    private static final long LONGEST_END_MILLIS = 2000;
     private static final long PERIOD_MILLIS = 33;
     /** Formatting that takes long is followed by a pause of this many times its length. */
     private static final long REST = 20;
@@ -18,25 +23,19 @@ final class Feed implements Runnable {
     /** The interval at which the page's time advances although nothing happens. */
     private static final long BEAT_NANOS = 500_000_000;
 
-    private static final String PREFIX = "data: ";
-
-    private final String run;
+    private final LiveNets nets;
     private final List<NetWatch> watches;
-    private final Workers workers;
     private final String[][] moments;
     private final String[][] rests;
     /** When each watch handed over last; 0 for never. */
     private final long[] seen;
-    private int viewers;
-    private byte[] newest = {};
-    private long version;
-    private boolean hurry;
-    private boolean closed;
+    private final Thread thread = new Thread(this::run, "net page");
+    private boolean drawn;
+    private volatile boolean over;
 
-    Feed(String run, List<NetWatch> watches, Workers workers) {
-        this.run = run;
+    private Feed(LiveNets nets, List<NetWatch> watches) {
+        this.nets = nets;
         this.watches = watches;
-        this.workers = workers;
         moments = new String[watches.size()][];
         rests = new String[watches.size()][];
         for (int i = 0; i < watches.size(); i++) {
@@ -46,94 +45,80 @@ final class Feed implements Runnable {
         seen = new long[watches.size()];
     }
 
-    /**
-     * Adds a viewer: returns the number of the newest state, after which it waits for another; -1 if there are enough
-     * viewers.
-     */
-    synchronized long enter(int most) {
-        if (viewers >= most || closed) {
-            return -1;
-        }
-        viewers++;
-        // The viewer gets a current state, not the one seen last.
-        hurry = true;
-        notifyAll();
-        return version;
-    }
-
-    /** Removes a viewer. */
-    synchronized void leave() {
-        viewers--;
-    }
-
-    /** Waits for a state with another number; null when the page is closed. */
-    synchronized State after(long known) throws InterruptedException {
-        while (version == known && !closed) {
-            wait();
-        }
-        return closed ? null : new State(version, newest);
-    }
-
-    /**
-     * A state.
-     *
-     * @param version the state's number
-     * @param event as a server-sent event
-     */
-    record State(long version, byte[] event) {
-        byte[] json() {
-            return Arrays.copyOfRange(event, PREFIX.length(), event.length - 1);
-        }
-    }
-
-    synchronized void close() {
-        closed = true;
-        notifyAll();
-    }
-
-    @Override
-    public void run() {
-        long publishedAt = 0;
+    /** Begins to show nets, as {@link NetPage#open} describes. */
+    static Feed open(String address, String title, List<NetWatch> watches) throws IOException {
         try {
-            while (awaitViewer()) {
-                long begun = System.nanoTime();
-                boolean changed = look(begun);
-                String state = text(begun);
-                long took = (System.nanoTime() - begun) / 1_000_000;
-                if (isHurried() || changed || begun - publishedAt >= BEAT_NANOS) {
-                    publish(state);
-                    publishedAt = begun;
-                }
-                workers.look();
-                Thread.sleep(Math.max(PERIOD_MILLIS, Math.min(LONGEST_REST_MILLIS, took * REST)));
+            Feed feed = new Feed(LiveNets.open(address, title), watches);
+            feed.thread.setDaemon(true);
+            feed.thread.start();
+            return feed;
+        } catch (FieldbusException e) {
+            if (e.status() == Status.BUS_FAILED) {
+                throw new IOException(e.getMessage(), e);
+            }
+            boolean isWrong = e.status() == Status.BAD_ARGUMENT;
+            throw isWrong ? new IllegalArgumentException(e.getMessage(), e) : new IllegalStateException(e.getMessage(), e);
+        }
+    }
+
+    URI address() {
+        return nets.address();
+    }
+
+    void close() {
+        over = true;
+        nets.close();
+        // Another page can ask the same watches from now on.
+        try {
+            thread.join(LONGEST_END_MILLIS);
+        } catch (InterruptedException e) {
+            Thread.currentThread().interrupt();
+        }
+    }
+
+    private void run() {
+        try {
+            feed();
+        } catch (FieldbusException refused) {
+            if (!over) {
+                System.getLogger(NetPage.class.getName()).log(System.Logger.Level.WARNING, "the nets are not shown any more", refused);
             }
         } catch (InterruptedException e) {
-            close();
+            Thread.currentThread().interrupt();
         }
     }
 
-    private synchronized boolean isHurried() {
-        boolean was = hurry;
-        hurry = false;
-        return was;
-    }
-
-    private boolean awaitViewer() throws InterruptedException {
-        synchronized (this) {
-            if (viewers > 0 || closed) {
-                return !closed;
+    private void feed() throws InterruptedException {
+        long publishedAt = 0;
+        boolean isFirst = true;
+        while (!over) {
+            if (!nets.isWanted(PATIENCE_NANOS)) {
+                isFirst = true;
+                continue;
             }
-            while (viewers == 0 && !closed) {
-                wait(LONGEST_REST_MILLIS);
-                workers.look();
+            if (!drawn) {
+                // Laying out a large net takes a while, so the first viewer triggers it.
+                nets.draw(Json.nets(watches.stream().flatMap(watch -> watch.nets().stream()).toList()));
+                drawn = true;
             }
+            if (isFirst) {
+                // A state handed over since the last viewer left can be old.
+                watches.forEach(NetWatch::ask);
+                for (int i = 0; i < PATIENT_PERIODS && !watches.stream().allMatch(NetWatch::isThere); i++) {
+                    Thread.sleep(PERIOD_MILLIS);
+                }
+            }
+            long begun = System.nanoTime();
+            boolean changed = look(begun);
+            String state = text(begun);
+            long took = (System.nanoTime() - begun) / 1_000_000;
+            if (isFirst || changed || begun - publishedAt >= BEAT_NANOS) {
+                nets.put(state);
+                publishedAt = begun;
+                isFirst = false;
+            }
+            Thread.sleep(Math.max(PERIOD_MILLIS, Math.min(LONGEST_REST_MILLIS, took * REST)));
         }
-        // A state handed over since the last viewer left can be old.
-        watches.forEach(NetWatch::ask);
-        for (int i = 0; i < PATIENT_PERIODS && !watches.stream().allMatch(NetWatch::isThere); i++) {
-            Thread.sleep(PERIOD_MILLIS);
-        }
-        return true;
     }
 
     /** Takes the state handed over, and asks for the next; true if more than the time has changed. */
@@ -142,9 +127,9 @@ final class Feed implements Runnable {
         for (int i = 0; i < watches.size(); i++) {
             NetWatch watch = watches.get(i);
             if (watch.isThere()) {
-                List<RunningNet> nets = watch.nets();
-                for (int n = 0; n < nets.size(); n++) {
-                    String rest = Json.state(nets.get(n), watch.state(n), watch.note());
+                List<RunningNet> all = watch.nets();
+                for (int n = 0; n < all.size(); n++) {
+                    String rest = Json.state(all.get(n), watch.state(n), watch.note());
                     changed |= !rest.equals(rests[i][n]);
                     rests[i][n] = rest;
                     moments[i][n] = Json.moment(watch.state(n));
@@ -157,19 +142,13 @@ final class Feed implements Runnable {
     }
 
     private String text(long now) {
-        List<String> nets = new ArrayList<>();
+        List<String> all = new ArrayList<>();
         for (int i = 0; i < watches.size(); i++) {
-            String age = seen[i] == 0 ? "null" : Long.toString((now - seen[i]) / 1_000_000);
+            String age = Long.toString((now - seen[i]) / 1_000_000);
             for (int n = 0; n < rests[i].length; n++) {
-                nets.add(rests[i][n] == null ? "null" : "{\"age\":" + age + "," + moments[i][n] + "," + rests[i][n] + "}");
+                all.add(rests[i][n] == null ? "null" : "{\"age\":" + age + "," + moments[i][n] + "," + rests[i][n] + "}");
             }
         }
-        return "{\"run\":\"" + run + "\",\"nets\":[" + String.join(",", nets) + "]}";
-    }
-
-    private synchronized void publish(String state) {
-        newest = (PREFIX + state + "\n\n").getBytes(StandardCharsets.UTF_8);
-        version++;
-        notifyAll();
+        return "{\"nets\":[" + String.join(",", all) + "]}";
     }
 }

@@ -8,17 +8,17 @@ import tickbus.petri.run.Conjunction;
 import tickbus.petri.run.NetState;
 import tickbus.petri.run.RunningNet;
 
-/** The messages to the page. */
+/** The messages to the page, as docs/petri.md describes them. */
 final class Json {
     private final StringBuilder out = new StringBuilder();
 
     private Json() {
     }
 
-    /** The nets for drawing. By {@code run} the page recognises whether it has the nets of this server. */
-    static String nets(String run, String title, List<RunningNet> nets) {
+    /** The nets for drawing. */
+    static String nets(List<RunningNet> nets) {
         Json json = new Json();
-        json.raw("{\"run\":").text(run).raw(",\"title\":").text(title).raw(",\"dots\":[");
+        json.raw("{\"dots\":[");
         int[][] dots = NetSvg.dots();
         for (int i = 0; i < dots.length; i++) {
             json.raw(i == 0 ? "[" : ",[");
@@ -131,11 +131,6 @@ final class Json {
         return json.raw("]").out.toString();
     }
 
-    /** A refusal. */
-    static String refusal(int code, String why) {
-        return new Json().raw("{\"code\":" + code + ",\"text\":").text(why).raw("}\n").out.toString();
-    }
-
     private Json raw(String json) {
         out.append(json);
         return this;
@@ -160,8 +155,10 @@ final class Json {
             char c = text.charAt(i);
             if (c == '"' || c == '\\') {
                 out.append('\\').append(c);
-            } else if (c < ' ' || c == '\u2028' || c == '\u2029' || Character.isSurrogate(c)) {
-                // A lone surrogate would not survive UTF-8; a pair does either way.
+            } else if (isLone(text, i)) {
+                // It would not survive UTF-8.
+                out.append('\uFFFD');
+            } else if (c < ' ') {
                 out.append(String.format("\\u%04x", (int) c));
             } else {
                 out.append(c);
@@ -169,5 +166,12 @@ final class Json {
         }
         out.append('"');
         return this;
+    }
+
+    /** True for half of a character that needs two. */
+    private static boolean isLone(String text, int i) {
+        char c = text.charAt(i);
+        return Character.isHighSurrogate(c) ? i + 1 == text.length() || !Character.isLowSurrogate(text.charAt(i + 1))
+            : Character.isLowSurrogate(c) && (i == 0 || !Character.isHighSurrogate(text.charAt(i - 1)));
     }
 }

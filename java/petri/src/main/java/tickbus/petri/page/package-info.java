@@ -1,2 +1,2 @@
-/** A live page about running nets, for browsers: see {@link tickbus.petri.page.NetPage}. Needs the JDK's module jdk.httpserver. */
+/** A live page about running nets, for browsers: see {@link tickbus.petri.page.NetPage}. Needs the jar of tickbus. */
 package tickbus.petri.page;

@@ -12,6 +12,7 @@ import java.nio.file.Files;
 import java.nio.file.Path;
 import java.util.List;
 import org.junit.jupiter.api.BeforeEach;
+import org.junit.jupiter.api.Tag;
 import org.junit.jupiter.api.Test;
 import org.junit.jupiter.api.io.TempDir;
 import tickbus.petri.format.Pnml;
@@ -276,6 +277,7 @@ class CommandTest {
     }
 
     @Test
+    @Tag("native")
     void thePageOfAStepperShowsEachStep() {
         assertEquals(0, run("start\n", "step", net.toString(), "--page"), () -> err);
         assertTrue(out.contains("page at http://127.0.0.1:"), out);

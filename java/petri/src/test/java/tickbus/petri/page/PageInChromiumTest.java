@@ -8,10 +8,12 @@ import static org.junit.jupiter.api.Assumptions.assumeTrue;
 import java.net.URI;
 import java.nio.file.Path;
 import org.junit.jupiter.api.BeforeEach;
+import org.junit.jupiter.api.Tag;
 import org.junit.jupiter.api.Test;
 import org.junit.jupiter.api.io.TempDir;
 
-/** The page in a real browser. Pictures of it are in {@code target/page}. */
+/** The page in a real browser, with nets that run in this process. Pictures of it are in {@code target/page}. */
+@Tag("native")
 class PageInChromiumTest {
     private static final Path PICTURES = Path.of("target", "page");
     private static final String START = "document.querySelector('[data-transition=\"0\"]')";
@@ -29,7 +31,7 @@ class PageInChromiumTest {
     }
 
     private static String row(int transition, String cell) {
-        return "document.querySelectorAll('.transitions tbody tr')[" + transition + "].querySelector('" + cell + "')";
+        return "document.querySelectorAll('#transitions tbody tr')[" + transition + "].querySelector('" + cell + "')";
     }
 
     @Test
@@ -42,7 +44,7 @@ class PageInChromiumTest {
                 viewer.await("document.getElementById('link').textContent === 'live'");
                 viewer.await(START + "?.classList.contains('net-held')");
                 assertEquals("The press", viewer.value("document.title"));
-                assertEquals("press <1>", viewer.value("document.querySelector('h2').firstChild.textContent"));
+                assertEquals("press <1>", viewer.value("document.querySelector('#net-title').textContent"));
                 assertEquals("1", viewer.value(tokens(0)));
                 assertEquals("7", viewer.value("document.querySelector('[data-place=\"3\"] .net-number').textContent"));
                 assertEquals("part there on 0", viewer.value("document.querySelector('.holds-back').textContent"));
@@ -58,11 +60,11 @@ class PageInChromiumTest {
                 viewer.await("document.querySelector('.net-fired')");
                 viewer.await("Number(document.querySelector('[data-place=\"3\"] .net-number').textContent) > 27");
                 viewer.await(tokens(1) + " === 1");
-                viewer.await("document.querySelector('.outputs tbody td').textContent === '1.5'");
+                viewer.await("document.querySelector('#outputs tbody td').textContent === '1.5'");
             }
             one.shoot(PICTURES.resolve("runs.png"));
             phone.shoot(PICTURES.resolve("phone-dark.png"));
-            phone.value("document.querySelector('.lists').scrollIntoView()");
+            phone.value("document.querySelector('#lists').scrollIntoView()");
             phone.shoot(PICTURES.resolve("phone-dark-lists.png"));
             scanning.part(false);
             one.await(tokens(1) + " === 0");
@@ -89,20 +91,21 @@ class PageInChromiumTest {
             assertEquals("start", viewer.value("document.querySelector('tr.chosen button').textContent"));
             viewer.value(row(1, "button") + ".click()");
             assertEquals("1", viewer.value("document.querySelector('.net-chosen').dataset.transition"));
-            viewer.value("document.getElementById('fit').click()");
-            assertEquals("true", viewer.value("document.getElementById('fit').getAttribute('aria-pressed')"));
-            viewer.await("document.querySelector('.drawing').scrollHeight <= document.querySelector('.drawing').clientHeight");
+            String drawing = "document.getElementById('drawing')";
+            viewer.await(drawing + ".scrollHeight <= " + drawing + ".clientHeight && " + drawing + ".getBoundingClientRect().bottom <= innerHeight");
+            viewer.value("document.getElementById('full').click()");
+            assertEquals("true", viewer.value("document.getElementById('full').getAttribute('aria-pressed')"));
             viewer.value("document.getElementById('hold').click()");
             viewer.await("document.getElementById('link').textContent === 'held still'");
             String shown = viewer.value("document.body.dataset.shown");
-            String text = viewer.value("document.querySelector('.facts-line').textContent");
+            String text = viewer.value("document.querySelector('#net-facts').textContent");
             long scans = scanning.scans();
             scanning.part(true);
-            viewer.await("(await (await fetch('/state')).json()).nets[0].scans > " + (scans + 100));
+            viewer.await("(await (await fetch(room.base + '/state')).json()).sets[0].nets[0].scans > " + (scans + 100));
             assertEquals(shown, viewer.value("document.body.dataset.shown"));
-            assertEquals(text, viewer.value("document.querySelector('.facts-line').textContent"));
+            assertEquals(text, viewer.value("document.querySelector('#net-facts').textContent"));
             viewer.value("document.getElementById('hold').click()");
-            viewer.await("document.querySelector('.facts-line').textContent !== " + "`" + text + "`");
+            viewer.await("document.querySelector('#net-facts').textContent !== " + "`" + text + "`");
         }
     }
 
@@ -115,13 +118,13 @@ class PageInChromiumTest {
                 viewer.go(address);
                 viewer.await("document.getElementById('link').textContent === 'live'");
                 scanning.standStill();
-                viewer.await("document.querySelector('.age').innerText.startsWith('Not scanned for')");
+                viewer.await("document.querySelector('#net-old').innerText.startsWith('Not scanned for')");
                 viewer.shoot(PICTURES.resolve("still.png"));
                 scanning.goOn();
-                viewer.await("document.querySelector('.age').hidden");
+                viewer.await("document.querySelector('#net-old').hidden");
             }
-            viewer.await("document.getElementById('link').textContent === 'no connection, trying again'");
-            viewer.await("document.getElementById('old').innerText.startsWith('Nothing heard for')");
+            viewer.await("document.getElementById('link').textContent === 'no connection'");
+            viewer.await("document.getElementById('age').innerText.startsWith('Nothing heard for')");
             assertEquals("true", viewer.value("document.body.classList.contains('is-old')"));
             viewer.shoot(PICTURES.resolve("old.png"));
             // A restarted program has other nets; this one shows the same nets under another title.
@@ -130,7 +133,7 @@ class PageInChromiumTest {
                 viewer.await("document.title === 'Second'");
                 viewer.await("document.getElementById('link').textContent === 'live'");
                 assertFalse(Boolean.parseBoolean(viewer.value("document.body.classList.contains('is-old')")));
-                assertEquals("1", viewer.value("document.querySelectorAll('section').length"));
+                assertEquals("1", viewer.value("document.querySelectorAll('#choice li').length"));
             }
         }
     }

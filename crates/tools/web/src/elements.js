@@ -1,6 +1,6 @@
 "use strict";
 
-// Elements that the scripts of the page make, and texts that they write into them.
+// Elements that the scripts of the pages make, and texts that they write into them.
 
 const elements = {
   /** Makes an element at the end of `parent`. */

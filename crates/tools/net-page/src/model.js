@@ -24,8 +24,8 @@ const nets = (() => {
       const fired = state ? state.last.filter((at) => at !== null) : [];
       /** For how long nothing has fired, in microseconds. */
       this.quiet = state ? state.us - (fired.length ? Math.max(...fired) : 0) : 0;
-      /** The transition that the net waits for: the first one that is held back. */
-      this.held = state ? state.phases.indexOf(String(HELD)) : -1;
+      /** The transitions that are held back. */
+      this.held = state ? this.layout.transitions.map((_, t) => t).filter((t) => state.phases[t] === String(HELD)) : [];
     }
 
     /** The part of its condition that holds the transition back; undefined if it is not known. */
@@ -35,11 +35,15 @@ const nets = (() => {
       return parts[this.state.failed[t] ?? (parts.length === 1 ? 0 : -1)];
     }
 
-    /** The other net that this one waits for. */
-    waitsForNet() {
-      if (!this.state || this.held < 0 || this.state.phases.includes(String(READY))) return null;
-      const part = this.partOf(this.held);
-      return part?.net === undefined || part.net === this.name ? null : this.set.byName.get(part.net) ?? null;
+    /** The other net that a transition waits for. */
+    blockerOf(t) {
+      const part = this.partOf(t);
+      return part?.net === undefined || part.net === this.name ? undefined : this.set.byName.get(part.net);
+    }
+
+    /** The other nets that this one waits for. */
+    waitsFor() {
+      return this.mark()[0] === "waits" ? this.held.map((t) => this.blockerOf(t)).filter(Boolean) : [];
     }
 
     /** The value of what a part of a condition tests, as text. */
@@ -61,15 +65,17 @@ const nets = (() => {
       if (this.isStill) return ["stands still", ""];
       if (state.phases.includes(String(READY)) || this.quiet < RUNS) return ["runs", "good"];
       if (state.phases.includes(String(DELAYED))) return ["delayed", "good"];
-      return [this.held < 0 ? "nothing enabled" : "waits", "stale"];
+      return [this.held.length ? "waits" : "nothing enabled", "stale"];
     }
 
     /** What the net waits for, and for how long; empty if it does not wait. */
     why() {
       if (this.state?.stop) return this.state.stop;
       if (this.mark()[0] !== "waits") return "";
-      const part = this.partOf(this.held);
-      const { name } = this.layout.transitions[this.held];
+      // A transition that another net holds back says more than one for an event that may never come, such as a stop.
+      const t = this.held.find((one) => this.blockerOf(one)) ?? this.held[0];
+      const part = this.partOf(t);
+      const { name } = this.layout.transitions[t];
       const what = part ? `${part.text} (${this.valueOf(part) || "not so"})` : "its condition";
       return `${seconds(this.quiet, 0)}: ${name} waits for ${what}`;
     }
@@ -84,32 +90,29 @@ const nets = (() => {
     return Number.isInteger(number) ? String(number) : String(Number(number.toPrecision(6)));
   }
 
-  /** The number of nets that wait for each net, also through others. */
-  function waiters(all) {
-    const count = new Map(all.map((net) => [net, 0]));
-    for (const net of all) {
-      const seen = new Set([net]);
-      for (let next = net.waitsForNet(); next && !seen.has(next); next = next.waitsForNet()) {
-        seen.add(next);
-        count.set(next, count.get(next) + 1);
-      }
-    }
-    return count;
+  /** The number of nets that wait for this one, also through others. */
+  function waiters(net, all) {
+    const found = new Set([net]);
+    // Each that is found can be waited for, too.
+    for (const one of found) for (const other of all) if (other.waitsFor().includes(one)) found.add(other);
+    return found.size - 1;
   }
 
   /**
-   * The net to look at: one that has stopped, or where nothing has happened for a while the one that most others wait for, of
-   * those the one that has waited longest. Null while the nets run.
+   * The net to look at: one that has stopped; or where nothing has happened for a while, of the nets that wait for no other one
+   * that which most others wait for, and of those the one that has waited longest. Null while the nets run.
    */
   function cause(all, patience) {
-    const scanned = all.filter((net) => net.state?.scans && !net.isStill);
     const stopped = all.find((net) => net.state?.stop);
     if (stopped) return stopped;
-    const waiting = scanned.filter((net) => net.mark()[0] === "waits" && net.quiet > patience);
-    if (!waiting.length || scanned.some((net) => net.quiet <= patience && net.mark()[0] !== "nothing enabled")) return null;
-    const count = waiters(scanned);
-    return waiting.reduce((best, net) => {
-      const more = count.get(net) - count.get(best);
+    const scanned = all.filter((net) => net.state?.scans && !net.isStill);
+    const waiting = scanned.filter((net) => net.mark()[0] === "waits");
+    const isQuiet = scanned.every((net) => net.quiet > patience && net.mark()[0] !== "delayed");
+    if (!waiting.length || !isQuiet) return null;
+    const roots = waiting.filter((net) => !net.waitsFor().length);
+    // Without any, the nets wait for each other in a circle.
+    return (roots.length ? roots : waiting).reduce((best, net) => {
+      const more = waiters(net, waiting) - waiters(best, waiting);
       return more > 0 || (more === 0 && net.quiet > best.quiet) ? net : best;
     });
   }

@@ -124,7 +124,7 @@ class PageInChromiumTest {
                 viewer.await("document.querySelector('#net-old').hidden");
             }
             viewer.await("document.getElementById('link').textContent === 'no connection'");
-            viewer.await("document.getElementById('age').innerText.startsWith('Nothing heard for')");
+            viewer.await("document.getElementById('age').innerText.startsWith('No connection to the nets')");
             assertEquals("true", viewer.value("document.body.classList.contains('is-old')"));
             viewer.shoot(PICTURES.resolve("old.png"));
             // A restarted program has other nets; this one shows the same nets under another title.

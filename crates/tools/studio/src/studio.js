@@ -66,8 +66,7 @@
     file = state;
     seen = state.state;
     running.keep(state.line);
-    document.title = `${state.name} – tickbus studio`;
-    get("title").textContent = state.name;
+    head.title(state.name, `${state.name} – tickbus studio`);
     get("path").textContent = state.path;
     const isSaved = state.unsaved === null;
     get("saved").textContent = state.isGone ? "gone" : isSaved ? "saved" : "not saved";

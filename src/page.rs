@@ -77,12 +77,14 @@ impl std::fmt::Display for PageError {
 ///
 /// The picture of the page, its address or its token is wrong, or this build has no pages.
 pub fn show_driver(driver: &mut Driver) -> Result<Option<Place>, Refusal> {
-    use std::io::Write as _;
+    use std::io::{IsTerminal as _, Write as _};
 
     let config = std::sync::Arc::clone(driver.config());
-    let announce = |url: &str| {
+    let announce = |url: &str, invitation: &str| {
+        let mut err = std::io::stderr().lock();
+        let invitation = if err.is_terminal() { invitation } else { "" };
         // The simulation runs even without a reader of stderr.
-        let _ = writeln!(std::io::stderr(), "tickbus: live page at {url}");
+        let _ = write!(err, "tickbus: live page at {url}\n{invitation}");
     };
     let opened = std::sync::Arc::clone(&config);
     let read = move || opened.read_again().map_err(|mistakes| mistakes.to_string());

@@ -143,7 +143,8 @@ fn serve_page(
     if let Some(file) = token_file {
         room.keep_token(file)?;
     }
-    say(&format!("page at {}", room.url()));
+    let invitation = room.invitation().for_terminal();
+    lab::say_page("dispatch", &room.url(), &invitation);
     let pages = tickbus_web::Pages::of("Patch bay", std::sync::Arc::new(site));
     room.serve(pages, Monotonic::shared())
 }

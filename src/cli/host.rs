@@ -1,7 +1,7 @@
 //! Shared by `tickbus plc` and `tickbus mirror`: hosts a PLC program at one end of a bus until stopped.
 
 use std::fmt::Write as _;
-use std::io::{self, Write as _};
+use std::io::{self, IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -71,6 +71,15 @@ impl Hosting {
             Box::new(io::stdout().lock())
         };
         out.write_all(text.as_bytes()).and_then(|()| out.flush())
+    }
+
+    /// Returns true if a person reads what [`say`](Self::say) prints.
+    fn is_terminal(&self) -> bool {
+        if self.format.is_json() {
+            io::stderr().is_terminal()
+        } else {
+            io::stdout().is_terminal()
+        }
     }
 }
 
@@ -155,8 +164,13 @@ pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
             return format.fail(title, &format!("{title}: {error}"), outcome);
         }
     };
-    let announce = |url: &str| {
-        let _ = arguments.say(&format!("{title}: page at {url}\n"));
+    let announce = |url: &str, invitation: &str| {
+        let invitation = if arguments.is_terminal() {
+            invitation
+        } else {
+            ""
+        };
+        let _ = arguments.say(&format!("{title}: page at {url}\n{invitation}"));
     };
     let shown = Shown {
         config: &config,
@@ -265,8 +279,8 @@ fn not_shown(title: &str, error: &PageError) -> Outcome {
 }
 
 /// Prints the address of the page.
-fn announce(title: &str) -> impl FnOnce(&str) {
-    move |url| super::lab::say(title, &format!("page at {url}"))
+fn announce(title: &str) -> impl FnOnce(&str, &str) {
+    move |url, invitation| super::lab::say_page(title, url, invitation)
 }
 
 /// Returns the outcome of a failure, which is the input's or the bus's.

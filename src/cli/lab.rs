@@ -1,6 +1,6 @@
 //! Shared by the commands of a virtual laboratory.
 
-use std::io::{self, Write as _};
+use std::io::{self, IsTerminal as _, Write as _};
 use std::path::Path;
 
 use super::Outcome;
@@ -31,6 +31,13 @@ pub(super) fn key(file: &str) -> Result<Key, String> {
 pub(super) fn say(title: &str, line: &str) {
     let mut out = io::stdout().lock();
     let _ = writeln!(out, "{title}: {line}").and_then(|()| out.flush());
+}
+
+/// Prints the address of a page, and on a terminal how other devices open it. The token is not for a log.
+pub(super) fn say_page(title: &str, url: &str, invitation: &str) {
+    let mut out = io::stdout().lock();
+    let invitation = if out.is_terminal() { invitation } else { "" };
+    let _ = write!(out, "{title}: page at {url}\n{invitation}").and_then(|()| out.flush());
 }
 
 /// Returns a stop that Ctrl-C triggers; reports an error if Ctrl-C cannot be caught.

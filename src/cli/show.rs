@@ -60,7 +60,7 @@ mod served {
     use tickbus_record::{Recording, RecordingError};
 
     use super::{Arguments, Kinds, Outcome};
-    use crate::cli::lab::{say, until_ctrl_c};
+    use crate::cli::lab::{say, say_page, until_ctrl_c};
     use crate::cli::progress::Progress;
     use crate::page;
 
@@ -85,9 +85,9 @@ mod served {
             recorded.ticks(),
             bytes.div_ceil(1 << 20),
         );
-        let announce = |url: &str| {
+        let announce = |url: &str, invitation: &str| {
             say("show", &told);
-            say("show", &format!("page at {url}"));
+            say_page("show", url, invitation);
         };
         let place = match page::show_recording(recorded, &arguments.page.listen(), announce) {
             Ok(place) => place,

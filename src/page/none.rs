@@ -15,7 +15,7 @@ pub enum Place {}
 /// Does nothing, unless the driver.cfg asks for a page, which is an error.
 pub(crate) fn show(
     shown: Shown<'_, impl FnOnce() -> Option<Watch>>,
-    _announce: impl FnOnce(&str),
+    _announce: impl FnOnce(&str, &str),
 ) -> Result<Option<Place>, PageError> {
     let Shown {
         config,
@@ -39,7 +39,7 @@ pub(crate) fn show_run(
     _name: &str,
     _listen: &Address,
     _controls: Controls,
-    _announce: impl FnOnce(&str),
+    _announce: impl FnOnce(&str, &str),
 ) -> Result<Place, PageError> {
     let text = "this tickbus was built without live pages; build it with --features page, or leave out --page";
     Err(PageError::Unsupported(text.to_owned()))

@@ -16,7 +16,7 @@ use tickbus_net::Address;
 use tickbus_net_page::{NetPage, Nets, Wanted};
 use tickbus_studio::{Running, Seat};
 use tickbus_virtual_time::Controls;
-use tickbus_web::{Joined, Limits, Page, Pages, Room, Serving};
+use tickbus_web::{Invitation, Joined, Limits, Page, Pages, Room, Serving};
 
 use super::{PageError, Read, Shown};
 
@@ -40,6 +40,7 @@ struct Open {
     /// True if only this computer reaches the page.
     is_here: bool,
     url: String,
+    invitation: Invitation,
     /// The address that the first driver asked for.
     asked: Address,
 }
@@ -102,10 +103,10 @@ pub fn url() -> Option<String> {
 }
 
 /// Shows the views of `watch` on the page, if the driver.cfg asks for one. `announce` receives the address of a new
-/// page.
+/// page, and what a terminal shows below it.
 pub(crate) fn show(
     shown: Shown<'_, impl FnOnce() -> Option<Watch>>,
-    announce: impl FnOnce(&str),
+    announce: impl FnOnce(&str, &str),
 ) -> Result<Option<Place>, PageError> {
     let config = shown.config;
     let Some(wanted) = &config.page else {
@@ -128,7 +129,7 @@ pub(crate) fn show(
     };
     // Whoever opens the page finds the driver there.
     if is_new {
-        announce(&open.url);
+        announce(&open.url, &open.invitation.for_terminal());
     }
     Ok(Some(Place {
         seat,
@@ -196,13 +197,13 @@ pub(crate) fn show_run(
     name: &str,
     listen: &Address,
     controls: Controls,
-    announce: impl FnOnce(&str),
+    announce: impl FnOnce(&str, &str),
 ) -> Result<Place, PageError> {
     let open = open(name, (listen, "--page 127.0.0.1:0"), None)?;
     let (live, is_new) = open.live()?;
     let member = live.page.join_run(name, controls);
     if is_new {
-        announce(&open.url);
+        announce(&open.url, &open.invitation.for_terminal());
     }
     Ok(Place {
         seat: None,
@@ -276,13 +277,14 @@ impl NetsPlace {
 pub(crate) fn show_recording(
     recorded: Recorded,
     listen: &Address,
-    announce: impl FnOnce(&str),
+    announce: impl FnOnce(&str, &str),
 ) -> Result<Place, PageError> {
     let open = open("recording", (listen, "--page 127.0.0.1:0"), None)?;
     let (live, _) = open.live()?;
     let member = live.page.join_recording(recorded);
     // Nothing can be forced, so nobody needs the token.
-    announce(open.plain_url());
+    let invitation = open.invitation.clone().without_token();
+    announce(open.plain_url(), &invitation.for_terminal());
     Ok(Place {
         seat: None,
         member: Some(member),
@@ -319,7 +321,7 @@ fn open(
         room.keep_token(file)
             .map_err(|error| PageError::NotServed(format!("the page has no token: {error}")))?;
     }
-    let url = room.url();
+    let (url, invitation) = (room.url(), room.invitation());
     let pages = Pages::default();
     let is_here = room.address().ip().is_loopback();
     let serving = room.serve(pages.clone(), Monotonic::shared());
@@ -331,6 +333,7 @@ fn open(
         nets: Mutex::default(),
         is_here,
         url,
+        invitation,
         asked: asked.clone(),
     });
     *present = Arc::downgrade(&open);

@@ -5,7 +5,8 @@
 const analyser = (() => {
   const { make, write } = elements;
   const get = (id) => document.getElementById(id);
-  const [ROW, AXIS] = [52, 24];
+  /** The heights of a signal, the least and the most, and of the axis, in pixels. */
+  const [ROW, HIGHEST, AXIS] = [52, 130, 24];
   /** The most signals. */
   const ROOM = 24;
   /** The shortest time on the axis, in milliseconds. */
@@ -25,6 +26,7 @@ const analyser = (() => {
   const canvas = get("waves");
   let act = {};
   let tracks = [];
+  let row = ROW;
   let colours = null;
   /** The length of the axis, and its end in the time of the bar's driver; without one it follows the present. */
   let span = 15000;
@@ -117,7 +119,7 @@ const analyser = (() => {
     }
     tracks.push(trackOf(signal));
     build();
-    act.say(`${signal.name} is on the axis.`);
+    act.say(`${signal.name} is on the axis${["overview", "recording"].includes(views.now) ? "" : ", under Recording"}.`);
   }
 
   function remove(track) {
@@ -127,7 +129,15 @@ const analyser = (() => {
     build();
     const next = tracks[Math.min(at, tracks.length - 1)];
     if (next) next.parts.remove.focus({ preventScroll: true });
-    else get("list").focus({ preventScroll: true });
+    else views.focus();
+  }
+
+  /** Shares the height of the window among the signals, in the view that has nothing else. */
+  function fit() {
+    const free = (get("axis").clientHeight - AXIS) / tracks.length;
+    row = views.now === "recording" ? Math.round(Math.min(HIGHEST, Math.max(ROW, free))) : ROW;
+    for (const item of get("tracks").children) item.style.height = `${row}px`;
+    changed();
   }
 
   function build() {
@@ -135,7 +145,6 @@ const analyser = (() => {
     get("analyser").classList.toggle("is-empty", !tracks.length);
     get("tracks").replaceChildren(...tracks.map((track) => {
       const item = document.createElement("li");
-      item.style.height = `${ROW}px`;
       const name = make("button", "pick", item, track.signal.name);
       name.title = `${track.signal.name}: choose it`;
       name.addEventListener("click", () => list.select(track.signal));
@@ -154,7 +163,7 @@ const analyser = (() => {
       return item;
     }));
     trigger.choices(tracks.map(({ signal }) => signal));
-    changed();
+    fit();
     collect();
   }
 
@@ -223,7 +232,7 @@ const analyser = (() => {
   /** The edge nearest to the pointer, of the signal below it if it has one that near; else the pointer's time. */
   function snapped(event) {
     const time = timeAt(xOf(event));
-    const own = tracks[Math.floor((event.clientY - plot.getBoundingClientRect().top) / ROW)];
+    const own = tracks[Math.floor((event.clientY - plot.getBoundingClientRect().top) / row)];
     return nearest(own ? [own] : [], time) ?? nearest(tracks, time) ?? { ms: time };
   }
 
@@ -347,12 +356,12 @@ const analyser = (() => {
     hasNews = false;
     colours ??= coloursAt(document.body);
     const { begin, end } = view();
-    const [wide, high] = [width(), tracks.length * ROW];
+    const [wide, high] = [width(), tracks.length * row];
     const ctx = context(canvas, wide + MARGIN, high + AXIS);
     run.begin = 0;
     const painted = { ctx, colours, left: 0, width: wide, isNarrow: false, from: begin, to: end };
     paintGrid(painted, high);
-    tracks.forEach((track, row) => drawTrack({ ...painted }, track, row * ROW));
+    tracks.forEach((track, i) => drawTrack({ ...painted }, track, i * row));
     drawCursor(ctx, first(), colours.cursor, "1", high);
     if (second) drawCursor(ctx, second.ms, colours.mark, "2", high);
     ctx.save();
@@ -370,15 +379,15 @@ const analyser = (() => {
     painted.to += offset;
     run.end = Math.min(painted.to, Math.max(track.until, held === null ? plant.now(signal.driver) : -Infinity));
     const [start, stop] = [Math.max(0, indexAt(times, painted.from)), indexAt(times, painted.to) + 1];
-    const [high, low] = [top + 7, top + ROW - 8];
+    const [high, low] = [top + 7, top + row - 8];
     ctx.save();
     ctx.beginPath();
-    ctx.rect(0, top, wide, ROW);
+    ctx.rect(0, top, wide, row);
     ctx.clip();
     ctx.save();
     ctx.translate(0, top);
     const seen = { times: times.slice(start, stop), values: values.slice(start, stop) };
-    trend.paintUnknown(painted, seen, ROW - 1);
+    trend.paintUnknown(painted, seen, row - 1);
     ctx.restore();
     track.isFew = isFew(seen.values);
     track.range = "";
@@ -399,7 +408,7 @@ const analyser = (() => {
     }
     ctx.restore();
     ctx.fillStyle = colours.rail;
-    ctx.fillRect(0, top + ROW - 1, wide, 1);
+    ctx.fillRect(0, top + row - 1, wide, 1);
   }
 
   /** The states of an integer, each with its value; the same value has the same colour. */
@@ -540,7 +549,7 @@ const analyser = (() => {
     1: () => choose(false),
     2: () => choose(true),
     Delete: dropSecond,
-    Escape: () => get("list").focus({ preventScroll: true }),
+    Escape: () => views.focus(),
   };
 
   plot.addEventListener("keydown", (event) => {
@@ -595,7 +604,8 @@ const analyser = (() => {
     add(plant.signals.find((signal) => plant.keyOf(signal) === key));
   });
 
-  new ResizeObserver(() => { if (tracks.length) changed(); }).observe(plot);
+  const sizes = new ResizeObserver(() => { if (tracks.length) fit(); });
+  for (const it of [plot, get("axis")]) sizes.observe(it);
   return {
     add, renew, redraw, moved, stop, follow, zoom, pan, all, toEdge,
     isMoving: () => tracks.length > 0 && held === null,

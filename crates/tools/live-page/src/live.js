@@ -104,7 +104,7 @@
     const isForced = plant.isForcedNow(signal);
     const isLost = !isForced && document.activeElement === get("release");
     get("release").disabled = !isForced;
-    if (isLost) get("list").focus({ preventScroll: true });
+    if (isLost) views.focus();
   }
 
   line.begin((...order) => {
@@ -140,6 +140,7 @@
       choose("all");
     },
   });
+  pads.begin({ release });
   analyser.begin({ say, redraw });
   trigger.begin({ say, follow: analyser.follow, stop: analyser.stop });
 
@@ -158,7 +159,7 @@
   get("let-go").addEventListener("click", () => {
     list.select(null);
     say("");
-    get("list").focus({ preventScroll: true });
+    views.focus();
   });
 
   window.addEventListener("keydown", (event) => {
@@ -166,11 +167,11 @@
     const isTyping = event.target.matches?.("input:not([type=range]), select");
     const isTray = get("tray").contains(event.target);
     if (event.key === "Escape" && isTray) {
-      get("list").focus({ preventScroll: true });
+      views.focus();
     } else if (event.key === "Escape" && event.target === get("filter")) {
       get("filter").value = "";
       list.filter("");
-      get("list").focus({ preventScroll: true });
+      views.focus();
     } else if (isTyping) {
       return;
     } else if (bar.key(event)) {
@@ -205,9 +206,16 @@
     get("filter").value = "";
     list.filter("");
     choose(kind);
+    views.reveal("signals");
     get("signals").scrollIntoView({ block: "nearest" });
   }
 
+  document.querySelector(".skip").addEventListener("click", () => views.reveal("signals"));
+  get("no-tracks").addEventListener("click", (event) => {
+    if (!event.target.closest("a")) return;
+    event.preventDefault();
+    views.reveal("signals");
+  });
   // Events.
 
   const sayForced = head.alarm("forced", "bad", [
@@ -233,7 +241,8 @@
     const further = now.forced > names.length ? ` and ${now.forced - names.length} more` : "";
     sayForced(now.forced ? `${words.count(now.forced, "signal is", "signals are")} forced: ${names.join(", ")}${further}` : "");
     const down = plant.drivers.filter(({ line }) => line && (line.status === "stale" || line.state !== "running"));
-    const told = down.map((driver) => (plant.drivers.length > 1 ? `${driver.name}: ${driver.line.reason}` : driver.line.reason));
+    // The view of the line has the reasons itself. The number of an error is for the log.
+    const told = views.now === "line" ? [] : down.map(({ name, line: { reason } }) => (plant.drivers.length > 1 ? `${name}: ` : "") + reason.replace(/ \(os error \d+\)/, ""));
     const safe = now.failSafe ? `${words.count(now.failSafe, "signal has its", "signals have their")} fail-safe ${now.failSafe === 1 ? "value" : "values"}` : "";
     get("show-failsafe").hidden = now.failSafe === 0;
     sayFailSafe([safe, told.join("; ")].filter(Boolean).join(": "));
@@ -262,8 +271,10 @@
     isDue = true;
     requestAnimationFrame(() => {
       isDue = false;
+      views.redraw();
       alarm();
       list.redraw();
+      pads.redraw();
       bar.redraw();
       analyser.redraw();
       if (list.chosen) showChosen(list.chosen);
@@ -273,6 +284,15 @@
       if (!isOld && (moves || list.isMoving() || analyser.isMoving() || bar.moment)) redraw();
     });
   }
+
+  views.begin({
+    shown() {
+      if (views.now === "signals" && list.chosen) list.find(list.chosen);
+      list.redraw();
+      touch.show();
+      redraw();
+    },
+  });
 
   head.listen({
     may: "may force",

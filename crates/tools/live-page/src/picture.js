@@ -23,6 +23,7 @@ const pictures = (() => {
     box.replaceChildren(...all.map(({ element }) => element));
     for (const picture of all) prepare(picture);
     touch.prepare(all);
+    pads.prepare();
     move();
   }
 

@@ -124,6 +124,7 @@ const touch = (() => {
 
   function openTrend(part) {
     const signal = chosenOf(part);
+    views.reveal("signals");
     list.toggle(signal);
     reveal(signal, part);
   }
@@ -131,32 +132,34 @@ const touch = (() => {
   // Push-buttons and switches.
 
   /** Presses a button: `by` is the pointer or the key that holds it. */
-  async function press(part, by) {
+  async function press(part, by, isQuiet = false) {
     const signal = part.signals[0];
     const path = act.pathOf(signal);
-    reveal(signal, part);
+    if (!isQuiet) reveal(signal, part);
     const before = held.get(path);
     // A button that is about to be let go is pressed after that.
-    if (before?.isLeft) before.next = { part, by };
+    if (before?.isLeft) before.next = { part, by, isQuiet };
     if (before || !act.canForce(signal)) return;
     if (isOld) return act.say("No connection: nothing can be pressed.", true);
     const to = signal.isBool ? (part.control.to > 0.5 ? "TRUE" : "FALSE") : String(part.control.to);
     owed.delete(path);
-    const one = { signal, part, by, since: performance.now(), sent: room.change("PUT", path, to) };
+    const one = { signal, part, by, isQuiet, since: performance.now(), sent: room.change("PUT", path, to) };
     held.set(path, one);
     show();
     const answer = await one.sent;
     // Without an answer the press may have arrived, and is released.
     one.isPressed = answer?.ok === true;
-    if (one.isPressed) act.say(`${signal.name} is ${one.isLeft ? "let go" : "pressed"}.`);
+    if (one.isPressed && isQuiet) act.say("");
+    else if (one.isPressed) act.say(`${signal.name} is ${one.isLeft ? "let go" : "pressed"}.`);
     else if (answer) act.say(answer.text, true);
     if (!one.isPressed) letGo(path);
   }
 
   /** Lets go of a button, not before its press has arrived and a slow PLC has seen it. */
-  async function letGo(path, told = `${held.get(path)?.signal.name} is let go.`) {
+  async function letGo(path, why = "") {
     const one = held.get(path);
     if (!one || one.isLeft) return;
+    const told = why || (one.isQuiet ? "" : `${one.signal.name} is let go.`);
     one.isLeft = true;
     show();
     const answer = await one.sent;
@@ -169,7 +172,7 @@ const touch = (() => {
     }
     held.delete(path);
     show();
-    if (one.next) press(one.next.part, one.next.by);
+    if (one.next) press(one.next.part, one.next.by, one.next.isQuiet);
   }
 
   /** Releases; without an answer it is tried again when the page is live. */
@@ -177,8 +180,7 @@ const touch = (() => {
     const answer = await room.change("DELETE", path);
     if (answer === null) return act.say("Nobody answers: a button is let go when the page is live again.", true);
     owed.delete(path);
-    if (!answer.ok) act.say(answer.text, true);
-    else act.say(done);
+    act.say(answer.ok ? done : answer.text, !answer.ok);
   }
 
   function letGoAll(isMine = () => true) {
@@ -194,10 +196,16 @@ const touch = (() => {
     letGoAll();
   }
 
+  /** Presses a button shortly, for a screen reader, which has no key or pointer to hold. */
+  function tap(part, isQuiet) {
+    press(part, "tap", isQuiet);
+    letGoAll(({ by }) => by === "tap");
+  }
+
   /** Turns a switch: a forced one goes back to what the machine makes it, another is forced to the opposite. */
-  function turn(part) {
+  function turn(part, isQuiet = false) {
     const signal = part.signals[0];
-    reveal(signal, part);
+    if (!isQuiet) reveal(signal, part);
     if (!act.canForce(signal)) return;
     if (plant.isForcedNow(signal)) return act.release(signal);
     const to = plant.measured(signal) > 0.5 ? "FALSE" : "TRUE";
@@ -222,8 +230,10 @@ const touch = (() => {
       on(end, (event) => letGoAll(({ by }) => by === event.pointerId));
     }
     on("click", (event, part) => {
-      if (!part || part.control?.do === "press") return;
-      if (part.control) turn(part);
+      if (!part) return;
+      if (part.control?.do === "press") {
+        if (!event.detail) tap(part);
+      } else if (part.control) turn(part);
       else if (event.detail < 2) find(part);
     });
     on("dblclick", (_, part) => { if (part && !part.control) openTrend(part); });
@@ -243,6 +253,33 @@ const touch = (() => {
     });
     // The notice of stale data stands below the drawing, so that it hides no button.
     frame.classList.toggle("has-controls", sheet.parts.some(({ control }) => control));
+  }
+
+  /** Makes a button outside of the picture do what a control of it does. Its place must not move while it is pressed. */
+  function bind(button, part) {
+    const mine = (one) => one.part === part;
+    button.addEventListener("contextmenu", (event) => event.preventDefault());
+    if (part.control.do === "switch") {
+      button.setAttribute("role", "switch");
+      button.addEventListener("click", () => turn(part, true));
+      return;
+    }
+    button.addEventListener("pointerdown", (event) => {
+      if (event.button !== 0) return;
+      button.setPointerCapture(event.pointerId);
+      press(part, event.pointerId, true);
+    });
+    for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) {
+      button.addEventListener(end, (event) => letGoAll(({ by }) => by === event.pointerId));
+    }
+    button.addEventListener("click", ({ detail }) => { if (!detail) tap(part, true); });
+    button.addEventListener("keydown", (event) => {
+      if (event.key !== " " && event.key !== "Enter") return;
+      event.preventDefault();
+      if (!event.repeat) press(part, event.key, true);
+    });
+    button.addEventListener("keyup", ({ key }) => letGoAll(({ by }) => by === key));
+    button.addEventListener("blur", () => letGoAll(mine));
   }
 
   /** Uses a key; returns whether it did. */
@@ -365,7 +402,12 @@ const touch = (() => {
   window.addEventListener("resize", () => show());
 
   return {
-    prepare, show,
+    prepare, show, bind,
+    /** The push-buttons and switches of all pictures, each once. */
+    get controls() {
+      const parts = sheets.flatMap(({ parts }) => parts.filter(({ control }) => control));
+      return parts.filter(({ key }, i) => parts.findIndex((other) => other.key === key) === i);
+    },
     /** Sets what the page does for a part: `say`, `canForce`, `change`, `pathOf`, `release`, `force`, `listAll`. */
     begin(actions) { act = actions; },
     /** Notes whether the page is without a connection, on which every button is let go. */

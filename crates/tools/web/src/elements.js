@@ -3,12 +3,12 @@
 // Elements that the scripts of the pages make, and texts that they write into them.
 
 const elements = {
-  /** Makes an element at the end of `parent`. */
+  /** Makes an element, at the end of `parent` if there is one. */
   make(tag, className, parent, content) {
     const it = document.createElement(tag);
     if (className) it.className = className;
     if (content !== undefined) it.textContent = content;
-    parent.append(it);
+    parent?.append(it);
     return it;
   },
 

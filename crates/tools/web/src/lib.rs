@@ -11,6 +11,7 @@ mod events;
 mod feed;
 mod feeds;
 mod guard;
+mod invitation;
 mod pages;
 mod patient;
 mod room;
@@ -19,6 +20,7 @@ mod serve;
 mod site;
 mod token;
 
+pub use invitation::Invitation;
 pub use pages::{Joined, Page, Pages};
 pub use room::{Limits, Room, Serving};
 pub use site::{

@@ -19,6 +19,7 @@ use tokio::sync::oneshot;
 
 use crate::feeds::Feeds;
 use crate::guard::Guard;
+use crate::invitation::Invitation;
 use crate::pages::Pages;
 use crate::patient::Patient;
 use crate::seats::Seats;
@@ -117,6 +118,11 @@ impl Room {
     pub fn url(&self) -> String {
         let port = self.address.port();
         format!("http://{}:{port}/#token={}", self.host, self.guard.token())
+    }
+
+    /// The ways in which other devices open this URL.
+    pub fn invitation(&self) -> Invitation {
+        Invitation::new(self.url(), self.address)
     }
 
     /// Serves these pages, in a separate thread, until the returned value is dropped.

@@ -4,6 +4,7 @@ mod analyser;
 mod large;
 mod outage;
 mod past;
+mod phone;
 mod touch;
 mod two_drivers;
 

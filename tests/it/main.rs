@@ -24,6 +24,8 @@ mod find;
 mod fmi;
 mod import;
 mod installed;
+#[cfg(all(unix, feature = "page"))]
+mod invitation;
 mod logo;
 mod loopback;
 mod machines;

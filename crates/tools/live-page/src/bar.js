@@ -233,7 +233,7 @@ const bar = (() => {
     const now = plant.now(lead);
     const ago = now - at;
     const span = words.span(Math.max(0, last - first));
-    range.setAttribute("aria-valuetext", moment ? `${words.moment(at)}, tick ${moment.tick}${isFile ? "" : `, ${words.span(ago)} ago`}` : "live");
+    range.setAttribute("aria-valuetext", moment ? `${words.moment(at)}, tick ${moment.tick}` : "live");
     get("pause").hidden = Boolean(moment) || isFile;
     get("to-live").hidden = !moment || isFile;
     if (moment) write(get("to-live"), `Live: +${words.span(ago)}`);

@@ -53,6 +53,8 @@ const pictures = (() => {
       if (!root.hasAttribute("viewBox") && root.width.baseVal.value) {
         root.setAttribute("viewBox", `0 0 ${root.width.baseVal.value} ${root.height.baseVal.value}`);
       }
+      const { width, height } = root.viewBox.baseVal ?? {};
+      if (width && height) element.style.setProperty("--ratio", width / height);
       root.setAttribute("role", "img");
       root.setAttribute("aria-label", title || `The machine of ${driver.name}`);
       // A picture's gradient names and styles must not affect the page, so it lives in a shadow root within its frame.

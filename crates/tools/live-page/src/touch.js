@@ -60,6 +60,8 @@ const touch = (() => {
       if (control) drawn.classList.add("tb-control");
       label(part);
     }
+    // A button has no buttons in it, for a screen reader.
+    for (const { element: drawn, control } of sheet.parts) if (!control && drawn.querySelector(".tb-part")) drawn.setAttribute("role", "group");
     if (!sheet.parts.length) return sheet;
     root.setAttribute("role", "group");
     root.setAttribute("tabindex", "0");
@@ -90,10 +92,16 @@ const touch = (() => {
   const stateOf = (signal) => (signal.isForced ? ", forced" : signal.isFailSafe ? ", fail-safe" : signal.isStale ? ", stale" : "");
   const textOf = (part) => part.signals.map((signal) => `${signal.name}: ${valueOf(signal)}${stateOf(signal)}`).join(" · ");
 
+  /** What is written in a part. */
+  const caption = (element) => Array.from(element.matches("text") ? [element] : element.querySelectorAll("text"), (it) => it.textContent.trim()).join(" ");
+
   function label(part) {
     const [first] = part.signals;
-    const text = part.control ? `${first.name}, ${KINDS[part.control.do]}` : textOf(part);
-    if (part.text !== text) part.element.setAttribute("aria-label", part.text = text);
+    const drawn = caption(part.element);
+    let text = part.control ? `${first.name}, ${KINDS[part.control.do]}` : textOf(part);
+    if (part.control && !text.toLowerCase().includes(drawn.toLowerCase())) text = `${drawn}: ${text}`;
+    // What is written in a part that moves is its name already.
+    if (part.text !== text) part.element.setAttribute(drawn && !part.control ? "aria-description" : "aria-label", part.text = text);
     const isOn = String(plant.number(first) > 0.5);
     if (part.control?.do !== "switch" || part.isOn === isOn) return;
     part.element.setAttribute("aria-checked", part.isOn = isOn);

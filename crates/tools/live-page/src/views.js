@@ -47,6 +47,7 @@ const views = (() => {
       if (link.dataset.view === view) link.setAttribute("aria-current", "page");
       else link.removeAttribute("aria-current");
     }
+    document.getElementById("times").role = view === "recording" ? "main" : null;
     document.getElementById("left").scrollTop = 0;
     if (view === "line") for (const events of document.querySelectorAll(".events")) events.open = true;
     // The focus must not stay on what is no longer shown.

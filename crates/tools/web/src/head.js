@@ -15,6 +15,9 @@ const head = (() => {
   const access = make("span", "access", { className: "tag" });
   const counts = make("span", "counts", { className: "note" });
   const age = make("p", "age", { className: "alarm bad", role: "alert", hidden: true });
+  const lost = make("span", "");
+  // Read aloud once, and not again with each second.
+  const since = make("span", "age-since", { ariaHidden: "true" });
   const alarms = make("div", "alarms");
   /** The page's own words: see `listen`. */
   let words = {};
@@ -26,6 +29,7 @@ const head = (() => {
 
   const state = make("p", "", { className: "state" });
   state.append(link, " ", access, " ", counts);
+  age.append(lost, " ", since);
   alarms.append(age);
   top.prepend(title, nav, state);
   top.append(alarms);
@@ -101,7 +105,8 @@ const head = (() => {
         document.body.classList.toggle("is-old", isOld);
         showLink();
         age.hidden = !isOld;
-        if (isOld) write(age, isKnown ? `${words.lost} What is shown is ${seconds} s old.` : words.lost);
+        write(lost, words.lost);
+        if (isOld) write(since, isKnown ? `What is shown is ${seconds} s old.` : "");
         listener.age?.(isOld);
       },
     });

@@ -95,8 +95,10 @@ const list = (() => {
       if (now.has(key)) continue;
       shown.delete(key);
       element.hidden = true;
+      view.append(element);
       spare[element.dataset.kind].push(element);
     }
+    let before = null;
     for (const [key, i] of now) {
       const row = rows[i];
       let element = shown.get(key);
@@ -104,8 +106,13 @@ const list = (() => {
         element = spare[row.kind].pop() ?? make[row.kind]();
         element.hidden = false;
         shown.set(key, element);
-        if (!element.isConnected) view.append(element);
       }
+      // A screen reader reads the elements in their order, wherever they are on the screen.
+      if ((before ? before.nextElementSibling : view.firstElementChild) !== element) {
+        if (before) before.after(element);
+        else view.prepend(element);
+      }
+      before = element;
       set(element, "top", `${tops[i]}px`, (it, value) => { it.style.transform = `translateY(${value})`; });
       set(element, "index", i + 2, (it, value) => it.setAttribute("aria-rowindex", value));
       paint[row.kind](element, row);

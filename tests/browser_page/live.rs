@@ -623,6 +623,8 @@ fn the_page_fits_every_screen_in_the_light_and_in_the_dark() {
             background
         );
         force(&browser, "LA1 position", "120");
+        // A phone begins with the picture.
+        browser.run("views.reveal('signals')");
         wait_marked_or_scroll(&browser, "LA1 position");
         choose(&browser, "LA1 position");
         browser.run("document.getElementById('trend').click()");

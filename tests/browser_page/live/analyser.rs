@@ -327,9 +327,7 @@ fn a_signal_is_dropped_and_leaves_and_the_axis_fits_a_phone_in_the_dark() {
     browser.devtools("Emulation.setEmulatedMedia", &dark);
     browser.resize(390, 844);
     browser.go(&machine.url);
-    // Rows below the screen are not drawn.
     browser.wait("plant.signals.length > 0");
-    browser.run("document.getElementById('list').scrollIntoView()");
     wait_shown(&browser, "Level", "500.00mm");
     for name in ["Level low", "Level", "Step"] {
         browser.run(&format!(
@@ -338,7 +336,8 @@ fn a_signal_is_dropped_and_leaves_and_the_axis_fits_a_phone_in_the_dark() {
         wait_said(&browser, &format!("{name} is on the axis"));
     }
     browser.wait("analyser.tracks.every(({ values }) => values.length > 2)");
-    browser.run("scrollTo(0, 0)");
+    browser.run("views.reveal('recording')");
+    browser.wait("document.getElementById('analyser').checkVisibility()");
     assert_fits(&browser);
     shoot(
         &browser,

@@ -153,6 +153,7 @@
   get("release").addEventListener("click", () => release(list.chosen));
   get("trend").addEventListener("click", () => {
     if (list.chosen) list.toggle(list.chosen);
+    if (list.chosen?.isOpen) views.reveal("signals");
     showChosen(list.chosen);
   });
   get("analyse").addEventListener("click", () => analyser.add(list.chosen));

@@ -58,11 +58,11 @@ public final class CellPicture {
     private void panel() {
         svg.rect(0, 0, WIDTH, HEIGHT, 14, "fill=\"#f1f4f7\"");
         svg.text(20, 38, "font-size=\"21\" font-weight=\"600\" " + INK, "The manufacturing cell");
-        lamp(330, 31, "S1 start", "start", "#3b82c4");
+        svg.button(310, 16, 86, "switch", "S1 start", "Start", "#2b79b5");
         lamp(420, 31, "Running lamp", "running", "#2fa85a");
-        lamp(530, 31, "S1 emergency", "emergency stop", "#d64545");
+        svg.button(520, 16, 138, "switch", "S1 emergency", "Emergency stop", "#d43a2f");
         lamp(690, 31, "Rearm lamp", "asks for Rearm", "#e0a030");
-        lamp(840, 31, "S1 rearm", "Rearm", "#3b82c4");
+        svg.button(834, 16, 86, "press", "S1 rearm", "Rearm", "#2b79b5");
     }
 
     private void lamp(double x, double y, String signal, String name, String colour) {

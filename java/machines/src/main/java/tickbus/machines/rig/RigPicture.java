@@ -84,7 +84,7 @@ public final class RigPicture {
                 id, x2, y2, stops);
     }
 
-    /** The operator panel's lamps, as the control drives them, and the rig's own Not OK. */
+    /** The operator panel: its lamps, as the control drives them, the rig's own Not OK, and the buttons. */
     private static void panel(Rig rig, Svg svg) {
         svg.text(28, 42, "font-size=\"21\" font-weight=\"600\" " + INK, "Test rig");
         String[] names = {"Ready", "Running", "Fault", "Parked", "Not OK"};
@@ -102,6 +102,9 @@ public final class RigPicture {
             svg.text(54, y + 5, "font-size=\"14\" " + (lit[i] ? INK + " font-weight=\"600\"" : PALE)
                     + Svg.bound("fill", "%s: off -> #8fa1b0, on -> #22313f", signal), names[i]);
         }
+        svg.button(28, 196, 86, "press", "Start button", "Start", "#35a060");
+        svg.button(124, 196, 86, "press", "Stop button", "Stop", "#d43a2f");
+        svg.button(220, 196, 86, "press", "Reset button", "Reset", "#2b79b5");
         svg.group(Svg.STILL, () -> {
             for (int i = 0; i < 2; i++) {
                 String paint = i == 0 ? "fresh" : "treated";

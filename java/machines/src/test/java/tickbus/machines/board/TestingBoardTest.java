@@ -89,4 +89,14 @@ class TestingBoardTest {
         BoardPicture.write(board, folder.resolve("board.svg"));
         assertEquals(svg, Files.readString(folder.resolve("board.svg")));
     }
+
+    /** {@code TICKBUS_UPDATE=1} redraws the picture. */
+    @Test
+    void thePictureOfTheLivePageIsTheSameDrawing() throws Exception {
+        Path file = Path.of("board.svg");
+        if (System.getenv("TICKBUS_UPDATE") != null) {
+            BoardPicture.write(new TestingBoard(), file);
+        }
+        assertEquals(Files.readString(file), BoardPicture.draw(new TestingBoard()));
+    }
 }

@@ -134,6 +134,24 @@ public final class Svg {
     }
 
     /**
+     * Adds a button that works on the live page, and is lit while its signal is on.
+     *
+     * @param x left
+     * @param y top
+     * @param width in pixels
+     * @param kind "press" for a push-button, "switch" for a switch
+     * @param signal the name of a BOOL
+     * @param caption the text on the button
+     * @param colour of the lit button
+     * @return this
+     */
+    public Svg button(double x, double y, double width, String kind, String signal, String caption, String colour) {
+        return group(bound(kind, signal), () -> rect(x, y, width, 30, 6, "fill=\"#3c474f\""
+                + bound("fill", "%s: off -> #3c474f, on -> %s", signal, colour))
+                .text(x + width / 2, y + 20, "font-size=\"14\" fill=\"#ffffff\" text-anchor=\"middle\"", caption));
+    }
+
+    /**
      * Adds an upright cylinder: a round top and a side.
      *
      * @param x the middle

@@ -1,4 +1,5 @@
-//! Any bytes as a recording: the first byte chooses between VCD and CSV, and whether the signals are known.
+//! Any bytes as a recording: the first byte chooses between VCD and CSV, whether the signals are known, and whether VCD of other
+//! programs is read as well.
 //!
 //! Nothing may panic, ticks are in order, and a reader's memory does not grow with what it has read.
 
@@ -19,7 +20,8 @@ fuzz_target!(|data: &[u8]| {
     let table = table();
     let table = (choice & 2 != 0).then_some(&table);
     let from = Box::new(Cursor::new(bytes.to_vec()));
-    let mut recording = match Recording::read("run", format, from, table) {
+    let read = if choice & 4 == 0 { Recording::read } else { Recording::read_any };
+    let mut recording = match read("run", format, from, table) {
         Ok(recording) => recording,
         Err(error) => {
             assert!(error.to_string().starts_with("run"));

@@ -106,7 +106,7 @@ mod served {
         let config = config.transpose().map_err(|wrong| wrong.to_string())?;
         let table = config.as_ref().map(|config| &config.table);
         let path = &arguments.recording;
-        let mut recording = Recording::open(path, table).map_err(|error| error.to_string())?;
+        let mut recording = Recording::open_any(path, table).map_err(|error| error.to_string())?;
         let name = path.display().to_string();
         let progress = Progress::begin("show", format!("reading {name}"));
         let limit = usize::try_from(arguments.memory).unwrap_or(usize::MAX);

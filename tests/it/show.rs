@@ -2,9 +2,9 @@
 
 use std::fmt::Write as _;
 use std::fs;
-use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::io::{BufRead as _, BufReader, Lines, Read as _, Write as _};
 use std::path::Path;
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Child, ChildStdout, Command, Output, Stdio};
 
 use serde_json::{Value, json};
 
@@ -25,6 +25,24 @@ impl Drop for Running {
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
+}
+
+/// Starts a command, and checks what it says of the recording; returns its further lines and the address of the page.
+fn started(
+    folder: &Path,
+    arguments: &[&str],
+    told: &str,
+) -> (Running, Lines<BufReader<ChildStdout>>, String) {
+    let child = show(folder, arguments).stdout(Stdio::piped()).spawn();
+    let mut child = Running(child.expect("the command runs"));
+    let mut lines = BufReader::new(child.0.stdout.take().expect("it is piped")).lines();
+    let mut line = || lines.next().expect("a line").expect("text");
+    assert_eq!(line(), format!("show: {told}"));
+    let url = line();
+    let url = url.strip_prefix("show: page at ").expect("the address");
+    assert!(url.starts_with("http://127.0.0.1:"), "{url}");
+    let url = url.to_owned();
+    (child, lines, url)
 }
 
 /// Runs a command that has to fail; returns what it says.
@@ -62,20 +80,12 @@ fn get(url: &str, path: &str) -> Value {
 fn a_recording_is_a_page_with_every_moment_until_it_is_interrupted() {
     let folder = tempfile::tempdir().expect("a folder");
     fs::write(folder.path().join("run.csv"), CSV).expect("there is room");
-    let child = show(folder.path(), &["run.csv", "--fault", "Lamp"])
-        .stdout(Stdio::piped())
-        .spawn()
-        .expect("the command runs");
-    let mut child = Running(child);
-    let mut lines = BufReader::new(child.0.stdout.take().expect("it is piped")).lines();
-    let mut line = || lines.next().expect("a line").expect("text");
-    assert_eq!(
-        line(),
-        "show: run.csv: 2 signals, 4 ticks from 1ms to 6ms, in 1 MB of memory"
+    let (mut child, mut lines, url) = started(
+        folder.path(),
+        &["run.csv", "--fault", "Lamp"],
+        "run.csv: 2 signals, 4 ticks from 1ms to 6ms, in 1 MB of memory",
     );
-    let url = line();
-    let url = url.strip_prefix("show: page at ").expect("the address");
-    assert!(url.starts_with("http://127.0.0.1:"), "{url}");
+    let url = &url;
     let signals = get(url, "/signals");
     let driver = &signals["drivers"][0];
     assert_eq!(driver["kind"], json!("recording"));
@@ -106,9 +116,47 @@ fn a_recording_is_a_page_with_every_moment_until_it_is_interrupted() {
             .args(["-INT", &child.0.id().to_string()])
             .status();
         assert!(interrupted.is_ok_and(|status| status.success()));
-        assert_eq!(line(), "show: ok");
+        assert_eq!(lines.next().expect("a line").expect("text"), "show: ok");
         assert_eq!(child.0.wait().expect("it ends").code(), Some(0));
     }
+}
+
+/// Files as Icarus Verilog 11.0 and PyVCD 0.5 have written them.
+#[test]
+fn vcd_of_other_programs_is_a_page_as_well() {
+    let folder = super::testing::repository().join("tests/it/vcd");
+    let told = "icarus.vcd: 10 signals, 18 ticks from 0ns to 82ns, in 1 MB of memory";
+    let (_icarus, _, url) = started(&folder, &["icarus.vcd"], told);
+    let driver = &get(&url, "/signals")["drivers"][0];
+    let signals = driver["signals"].as_array().expect("a list").iter();
+    let known: Vec<_> = signals
+        .map(|it| format!("{} {} {}", it["name"], it["type"], it["value"]).replace('"', ""))
+        .collect();
+    let expected = [
+        "top.value USINT 7",
+        "top.maybe BOOL 1",
+        "top.clk BOOL 0",
+        "top.reset BOOL 0",
+        "top.tiny USINT 9",
+        "top.i DINT 5",
+        "top.level LREAL 2500",
+        "top.cpu.clk BOOL 0",
+        "top.cpu.reset BOOL 0",
+        "top.cpu.value USINT 7",
+    ];
+    assert_eq!(known, expected);
+    // At 10 ns the value is not known yet, and the integer is negative.
+    let at = get(&url, &format!("/history/{}/at/0.000004", driver["id"]));
+    assert_eq!(at["values"][0], json!([0, null]));
+    assert_eq!(at["values"][5], json!([5, -3]));
+
+    let told = "pyvcd.vcd: 5 signals, 7 ticks from 0ns to 6ms, in 1 MB of memory";
+    let (_pyvcd, _, url) = started(&folder, &["pyvcd.vcd"], told);
+    let driver = &get(&url, "/signals")["drivers"][0];
+    let trend = get(&url, &format!("/trend/{}/3/0/9", driver["id"]));
+    assert_eq!(driver["signals"][3]["name"], json!("plant.tank.level"));
+    let values = json!([1.5, 0.25, 0.5, 0.75, 1.0, 1.25]);
+    assert_eq!(trend["signals"]["3"]["values"], values);
 }
 
 #[test]
@@ -121,7 +169,7 @@ fn wrong_input_is_told_with_what_to_do() {
     file("words.vcd", "hello\n");
     file(
         "other.vcd",
-        "$timescale 1 ns $end\n$var wire 1 a A $end\n$enddefinitions $end\n#0\n1a\n",
+        "$timescale 1 ns $end\n$var wire 1 a A $end\n$enddefinitions $end\n#0\n1b\n",
     );
     file(
         "cut.vcd",
@@ -145,9 +193,15 @@ fn wrong_input_is_told_with_what_to_do() {
             "missing.vcd: the recording cannot be read",
         ),
         (&["run.txt"], "run.txt: "),
-        (&["empty.vcd"], "the recording is cut within its header"),
-        (&["words.vcd"], "this is no VCD"),
-        (&["other.vcd"], "only recordings of tickbus can be read"),
+        (&["empty.vcd"], "the file ends within its header"),
+        (
+            &["words.vcd"],
+            "words.vcd:1: \"hello\" is no command of a header",
+        ),
+        (
+            &["other.vcd"],
+            "other.vcd:5: the value of \"b\", which the header does not have",
+        ),
         (
             &["cut.vcd"],
             "the recording is cut within its header; record again",

@@ -1,6 +1,7 @@
 //! Reading recordings tick by tick, in constant memory.
 
 mod csv;
+mod foreign;
 mod lines;
 mod vcd;
 
@@ -9,6 +10,7 @@ use std::io::{self, BufRead, BufReader};
 use std::path::Path;
 
 use self::csv::CsvReader;
+use self::foreign::ForeignReader;
 pub use self::vcd::MOST_COLUMNS;
 use self::vcd::VcdReader;
 use super::{Columns, Format, Tick};
@@ -75,6 +77,7 @@ const RECORD_AGAIN: &str = "record again, or take a copy that is whole";
 enum Reader {
     Vcd(VcdReader<Box<dyn BufRead + Send>>),
     Csv(CsvReader<Box<dyn BufRead + Send>>),
+    Foreign(ForeignReader<Box<dyn BufRead + Send>>),
 }
 
 /// A recording that is being read.
@@ -103,28 +106,44 @@ impl Recording {
     ///
     /// The file cannot be read, or is not a recording.
     pub fn open(path: &Path, table: Option<&SignalTable>) -> Result<Self, RecordingError> {
-        let file = path.display().to_string();
-        let format = Format::of(path)
-            .map_err(|Mistake { what, right }| RecordingError::of_file(path, what, right))?;
-        let opened = File::open(path).and_then(|file| {
-            if file.metadata()?.is_dir() {
-                return Err(io::ErrorKind::IsADirectory.into());
-            }
-            Ok(file)
-        });
-        let opened = opened.map_err(|error| {
-            RecordingError::of_file(
-                path,
-                format!("the recording cannot be read: {error}"),
-                "check the path and the name",
-            )
-        })?;
-        Self::read(
-            &file,
-            format,
-            Box::new(BufReader::with_capacity(1 << 16, opened)),
-            table,
-        )
+        let (file, format, from) = source(path)?;
+        Self::read(&file, format, from, table)
+    }
+
+    /// Like [`open`](Self::open), and reads VCD of other programs as well: each time is a tick, and each variable a signal
+    /// called by its scopes and name.
+    ///
+    /// # Errors
+    ///
+    /// The file cannot be read, or is neither a recording nor VCD.
+    pub fn open_any(path: &Path, table: Option<&SignalTable>) -> Result<Self, RecordingError> {
+        let (file, format, from) = source(path)?;
+        Self::read_any(&file, format, from, table)
+    }
+
+    /// Like [`open_any`](Self::open_any), for a file from another source; errors call it `file`.
+    ///
+    /// # Errors
+    ///
+    /// The source is neither a recording nor VCD.
+    pub fn read_any(
+        file: &str,
+        format: Format,
+        mut from: Box<dyn BufRead + Send>,
+        table: Option<&SignalTable>,
+    ) -> Result<Self, RecordingError> {
+        // A reader reports a source that cannot be read.
+        let is_own = from.fill_buf().map_or(true, foreign::is_own);
+        if is_own || format != Format::Vcd {
+            return Self::read(file, format, from, table);
+        }
+        let opened = ForeignReader::open(from);
+        let (reader, columns) = opened.map_err(|(fault, line)| error(file, fault, line))?;
+        Ok(Self {
+            file: file.to_owned(),
+            columns,
+            reader: Reader::Foreign(reader),
+        })
     }
 
     /// Like [`open`](Self::open), for a recording from another source; errors call it `file`.
@@ -171,6 +190,7 @@ impl Recording {
         let (read, line) = match &mut self.reader {
             Reader::Vcd(reader) => (reader.next(tick), reader.line()),
             Reader::Csv(reader) => (reader.next(tick, &self.columns), reader.line()),
+            Reader::Foreign(reader) => (reader.next(tick), reader.line()),
         };
         read.map_err(|fault| error(&self.file, fault, line))
     }
@@ -181,6 +201,7 @@ impl Recording {
         match &self.reader {
             Reader::Vcd(reader) => reader.ending(),
             Reader::Csv(reader) => reader.ending(),
+            Reader::Foreign(_) => "the file has no more times".to_owned(),
         }
     }
 
@@ -190,8 +211,30 @@ impl Recording {
         match &self.reader {
             Reader::Vcd(reader) => reader.is_cut(),
             Reader::Csv(reader) => reader.is_cut(),
+            Reader::Foreign(_) => false,
         }
     }
+}
+
+/// Opens a file: its name for errors, and its format.
+fn source(path: &Path) -> Result<(String, Format, Box<dyn BufRead + Send>), RecordingError> {
+    let format = Format::of(path)
+        .map_err(|Mistake { what, right }| RecordingError::of_file(path, what, right))?;
+    let opened = File::open(path).and_then(|file| {
+        if file.metadata()?.is_dir() {
+            return Err(io::ErrorKind::IsADirectory.into());
+        }
+        Ok(file)
+    });
+    let opened = opened.map_err(|error| {
+        RecordingError::of_file(
+            path,
+            format!("the recording cannot be read: {error}"),
+            "check the path and the name",
+        )
+    })?;
+    let from = Box::new(BufReader::with_capacity(1 << 16, opened));
+    Ok((path.display().to_string(), format, from))
 }
 
 fn error(file: &str, fault: ReadError, line: u64) -> RecordingError {

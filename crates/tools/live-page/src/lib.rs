@@ -25,6 +25,7 @@ mod recorded;
 mod run;
 mod sheet;
 mod shown;
+mod trends;
 mod value;
 
 pub use options::Options;

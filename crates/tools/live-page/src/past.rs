@@ -1,34 +1,23 @@
 //! The requests about the past, on a thread of their own: a search through a long history must not delay the present.
 
-use std::collections::BTreeMap;
 use std::io::{self, Cursor};
 use std::sync::Arc;
 use std::sync::mpsc::{Sender, channel};
 use std::thread::{self, JoinHandle};
 
-use serde_json::json;
 use tickbus_base::time::Nanos;
-use tickbus_record::{Format, Moment, Recording, TrendPoint};
+use tickbus_record::{Format, Moment, Recording};
 use tickbus_report::{Contents, DEFAULT_BUDGET};
 use tickbus_web::{Answer, Document};
 
-use crate::archive::{Archive, millis};
+use crate::archive::Archive;
 use crate::exhibit::Exhibit;
 use crate::model::Shared;
-use crate::value::Number;
+use crate::trends;
 
 /// The paths of the past.
 const HISTORY: &str = "/history/";
 const TREND: &str = "/trend/";
-
-/// The length of a trend if none is asked for.
-const TREND_SPAN: Nanos = Nanos::from_secs(300);
-
-/// The most changes of a trend; of more, each of some spans has its first, least, greatest and last value.
-const MOST_POINTS: usize = 40_000;
-
-/// The most signals of one request for trends.
-const MOST_TRENDS: usize = 100;
 
 /// The largest file that is saved, in bytes.
 const LARGEST: usize = 512 << 20;
@@ -98,7 +87,8 @@ impl Door {
 fn document(model: &Shared, path: &str) -> Option<Document> {
     if let Some(path) = path.strip_prefix(TREND) {
         let (id, path) = path.split_once('/')?;
-        return trends(&*archive(model, id)?, path);
+        let text = trends::document(&*archive(model, id)?, path)?;
+        return Some(Document { kind: JSON, text });
     }
     let mut parts = path.strip_prefix(HISTORY)?.split('/');
     let archive = archive(model, parts.next()?)?;
@@ -133,7 +123,7 @@ fn moment(kind: &str, place: &str) -> Option<Moment> {
 }
 
 /// A time in milliseconds.
-fn time(text: &str) -> Option<Nanos> {
+pub(crate) fn time(text: &str) -> Option<Nanos> {
     let millis: f64 = text
         .parse()
         .ok()
@@ -141,85 +131,6 @@ fn time(text: &str) -> Option<Nanos> {
     #[expect(clippy::cast_possible_truncation, reason = "a cast saturates")]
     let nanos = (millis * 1e6).round() as i64;
     Some(Nanos(nanos))
-}
-
-/// The trends of signals: `INDEX,INDEX/FROM/TO`, or `INDEX` for the last minutes.
-fn trends(archive: &Archive, path: &str) -> Option<Document> {
-    let span = archive.history.span();
-    let last = span.map_or(Nanos::ZERO, |span| span.last.1);
-    let parts: Vec<&str> = path.split('/').collect();
-    let (indices, from, to) = match parts[..] {
-        [index] => (index, last - TREND_SPAN, last),
-        [indices, from, to] => (indices, time(from)?, time(to)?),
-        _ => return None,
-    };
-    let one = |index: usize| {
-        let signal = archive.facts.table.signals.get(index)?;
-        let can_be_stale = archive.facts.reads.is_none_or(|reads| reads == signal.area);
-        let station = can_be_stale.then_some(signal.station);
-        let points = archive.history.trend(index, station, (from, to));
-        let value = |slot| Number::of(signal, slot).real();
-        let points: Vec<TrendPoint> = archive.with_forces(index, points, to);
-        let mut points: Vec<(Nanos, f64)> = points
-            .iter()
-            .map(|(at, slot)| (*at, slot.map_or(f64::NAN, value)))
-            .collect();
-        let is_thin = points.len() > MOST_POINTS;
-        if is_thin {
-            points = thinned(&points, (from.max(points[0].0), to.min(last)));
-        }
-        let (ms, values): (Vec<f64>, Vec<f64>) = points
-            .iter()
-            .map(|(at, value)| (millis(*at), *value))
-            .unzip();
-        let mut trend = json!({ "ms": ms, "values": values });
-        if is_thin {
-            trend["is_thin"] = json!(true);
-        }
-        Some(trend)
-    };
-    let indices: Option<Vec<usize>> = indices.split(',').map(|index| index.parse().ok()).collect();
-    let indices = indices.filter(|indices| indices.len() <= MOST_TRENDS)?;
-    let to_ms = millis(to.min(last));
-    if let ([index], 1) = (&indices[..], parts.len()) {
-        let mut trend = one(*index)?;
-        trend["to_ms"] = json!(to_ms);
-        return Some(Document {
-            kind: JSON,
-            text: trend.to_string(),
-        });
-    }
-    let trends: Option<BTreeMap<usize, _>> = indices
-        .into_iter()
-        .map(|index| Some((index, one(index)?)))
-        .collect();
-    let json =
-        json!({ "to_ms": to_ms, "is_sampled": archive.facts.is_sampled, "signals": trends? });
-    Some(Document {
-        kind: JSON,
-        text: json.to_string(),
-    })
-}
-
-/// Fewer points, without losing an extreme.
-fn thinned(points: &[(Nanos, f64)], (from, to): (Nanos, Nanos)) -> Vec<(Nanos, f64)> {
-    let spans = i64::try_from(MOST_POINTS / 4).unwrap_or(1);
-    let length = ((to - from).0 / spans).max(1);
-    let mut thin: Vec<(Nanos, f64)> = Vec::with_capacity(MOST_POINTS);
-    for group in points.chunk_by(|a, b| (a.0 - from).0 / length == (b.0 - from).0 / length) {
-        let by = |a: &&(Nanos, f64), b: &&(Nanos, f64)| a.1.total_cmp(&b.1);
-        let ends = [
-            group.first(),
-            group.iter().min_by(by),
-            group.iter().max_by(by),
-            group.last(),
-        ];
-        let mut ends: Vec<_> = ends.into_iter().flatten().copied().collect();
-        ends.sort_by_key(|(at, _)| *at);
-        ends.dedup_by_key(|(at, _)| *at);
-        thin.extend(ends);
-    }
-    thin
 }
 
 /// The ticks from a time to that in the name of the file, as a file.

@@ -6,6 +6,7 @@
 //! references to them.
 
 mod block;
+mod trends;
 #[cfg(all(test, not(loom)))]
 #[allow(
     clippy::cast_possible_truncation,
@@ -30,6 +31,9 @@ const LEAST_BLOCK: usize = 16 << 10;
 /// A history has at least this many blocks, unless a single state is larger.
 const LEAST_BLOCKS: usize = 16;
 
+/// The most outages that are kept.
+const MOST_OUTAGES: usize = 10_000;
+
 /// A recording in memory, bounded in bytes.
 #[derive(Debug)]
 pub struct History {
@@ -51,6 +55,39 @@ struct Kept {
     bytes: usize,
     /// The last tick, with sums of edges.
     now: Tick,
+    /// The outages since the first tick that is kept, oldest first: each with its end, if it has ended.
+    outages: VecDeque<(Nanos, Option<Nanos>)>,
+}
+
+impl Kept {
+    /// Notes whether the data of a tick are stale.
+    fn note_outage(&mut self, tick: &Tick) {
+        let mut stations = tick.stations.iter().copied();
+        let is_now = is_stale(tick.status) || stations.any(is_stale);
+        let last = self.outages.back_mut().filter(|(_, end)| end.is_none());
+        match (last, is_now) {
+            (None, true) => {
+                if self.outages.len() == MOST_OUTAGES {
+                    self.outages.pop_front();
+                }
+                self.outages.push_back((tick.time, None));
+            }
+            (Some((_, end)), false) => *end = Some(tick.time),
+            (None, false) | (Some(_), true) => {}
+        }
+    }
+
+    /// Drops outages that ended before the first tick.
+    fn drop_outages(&mut self) {
+        let oldest = self.blocks.front().map(|block| &**block);
+        let Some(first) = oldest.or(self.open.as_ref()).map(|block| block.first.1) else {
+            return;
+        };
+        let is_over = |outage: &(Nanos, Option<Nanos>)| outage.1.is_some_and(|end| end <= first);
+        while self.outages.front().is_some_and(is_over) {
+            self.outages.pop_front();
+        }
+    }
 }
 
 /// A moment in a history.
@@ -105,6 +142,7 @@ impl History {
                 open: None,
                 bytes: 0,
                 now: tick,
+                outages: VecDeque::new(),
             }),
         }
     }
@@ -123,11 +161,13 @@ impl History {
     /// [`ValueKind::kept`].
     pub fn push(&self, tick: &Tick) {
         let mut kept = self.lock();
+        kept.note_outage(tick);
         let Kept {
             blocks,
             open,
             bytes,
             now,
+            ..
         } = &mut *kept;
         let block = open.get_or_insert_with(|| {
             if blocks.is_empty() && now.number == 0 {
@@ -152,11 +192,16 @@ impl History {
             size = 0;
             blocks.push_back(Arc::new(full));
         }
+        let mut has_dropped = false;
         while *bytes + size > self.limit
             && let Some(oldest) =
                 (blocks.len() > usize::from(size == 0)).then(|| blocks.pop_front())
         {
             *bytes -= oldest.map_or(0, |oldest| oldest.bytes());
+            has_dropped = true;
+        }
+        if has_dropped {
+            kept.drop_outages();
         }
     }
 
@@ -235,77 +280,10 @@ impl History {
         (steps > 0).then_some(cursor.tick)
     }
 
-    /// The changes of a column between two times, both included: first its value at `from`, or at the oldest tick.
-    /// `station` is the station whose stale data have no value, by its index in [`Columns::stations`]; without any
-    /// stations, the status of the whole exchange counts. `None` if the values are never stale.
-    pub fn trend(
-        &self,
-        column: usize,
-        station: Option<usize>,
-        (from, to): (Nanos, Nanos),
-    ) -> Vec<TrendPoint> {
-        let mut points: Vec<TrendPoint> = Vec::new();
-        // The state that the next tick meets.
-        let mut begun: Option<TrendPoint> = None;
-        let seen = |tick: &Tick| {
-            let status = station.map(|station| tick.stations.get(station).unwrap_or(&tick.status));
-            let is_live = status.is_none_or(|status| !is_stale(*status));
-            is_live.then(|| tick.values[column])
-        };
-        for block in self.blocks(from, to) {
-            let is_quiet = !block.has_changed(column) && !block.has_turn;
-            if is_quiet && block.last.1 > from && begun.is_some() {
-                continue;
-            }
-            let mut cursor = Cursor::new(&block, &self.kinds);
-            while cursor.step() {
-                let time = cursor.tick.time;
-                if time > to {
-                    break;
-                }
-                let value = seen(&cursor.tick);
-                if time <= from || begun.is_none() {
-                    begun = Some((time.max(from), value));
-                    points.clear();
-                    points.push((time.max(from), value));
-                    if is_quiet && block.first.1 >= from {
-                        break;
-                    }
-                } else if points.last().is_some_and(|(_, last)| *last != value) {
-                    points.push((time, value));
-                }
-            }
-        }
-        points
-    }
-
-    /// The times in which data of a station are stale, or of any without stations; the last one may still last.
+    /// The times in which data of a station are stale, or of any without stations; the last one may still last. At most
+    /// the last 10,000.
     pub fn outages(&self) -> Vec<(Nanos, Option<Nanos>)> {
-        let mut outages: Vec<(Nanos, Option<Nanos>)> = Vec::new();
-        let mut is_out = false;
-        for (at, block) in self.blocks(Nanos(i64::MIN), Nanos::MAX).iter().enumerate() {
-            if at > 0 && !block.has_turn {
-                continue;
-            }
-            let mut cursor = Cursor::new(block, &self.kinds);
-            while cursor.step() {
-                let stations = cursor.tick.stations.iter().copied();
-                let is_now = is_stale(cursor.tick.status) || stations.into_iter().any(is_stale);
-                if is_now && !is_out {
-                    outages.push((cursor.tick.time, None));
-                } else if !is_now
-                    && is_out
-                    && let Some((_, end)) = outages.last_mut()
-                {
-                    *end = Some(cursor.tick.time);
-                }
-                is_out = is_now;
-                if !block.has_turn {
-                    break;
-                }
-            }
-        }
-        outages
+        self.lock().outages.iter().copied().collect()
     }
 
     /// The nearest tick after the one with this number that is a goal, or before it; its number and time.

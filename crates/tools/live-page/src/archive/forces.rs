@@ -7,6 +7,12 @@ use tickbus_record::TrendPoint;
 use super::{Archive, Force, Mark};
 
 impl Archive {
+    /// True if a signal has ever been forced.
+    pub(crate) fn has_forces(&self, signal: usize) -> bool {
+        let is_of = |mark: &Mark| mark.force.is_some_and(|force| force.signal == signal);
+        self.is_written(signal) && self.notes().marks.iter().any(is_of)
+    }
+
     /// The changes of a signal between two times, as the other end got them: a forced value in place of what the
     /// simulation wrote meanwhile.
     pub(crate) fn with_forces(
@@ -15,13 +21,11 @@ impl Archive {
         points: Vec<TrendPoint>,
         to: Nanos,
     ) -> Vec<TrendPoint> {
-        let Some((begin, _)) = points.first().copied().filter(|_| self.is_written(signal)) else {
+        let begin = points.first().map(|(begin, _)| *begin);
+        let Some(begin) = begin.filter(|_| self.has_forces(signal)) else {
             return points;
         };
         let is_of = |mark: &Mark| mark.force.is_some_and(|force| force.signal == signal);
-        if !self.notes().marks.iter().any(is_of) {
-            return points;
-        }
         // The forces in their order; the second of two at the same time counts.
         let mut turns: Vec<(Nanos, Option<Slot>)> = Vec::new();
         let mut on: Option<String> = None;

@@ -38,6 +38,10 @@ impl BusOptions for ClientOptions {
         Vec::new()
     }
 
+    fn is_client(&self) -> bool {
+        true
+    }
+
     fn examine(&self, examination: &mut Examination<'_>) {
         self.line.examine(examination);
     }

@@ -85,6 +85,10 @@ impl BusOptions for ServerOptions {
         Some("every write")
     }
 
+    fn address(&self) -> Option<String> {
+        self.line.address().map(Address::to_string)
+    }
+
     fn set_address(&mut self, address: &str) -> Option<Result<(), Mistake>> {
         Some(self.line.set_address(address, |_| Ok(())))
     }
@@ -169,6 +173,14 @@ impl BusOptions for ClientOptions {
 
     fn cycle(&self) -> Option<Nanos> {
         Some(CYCLE)
+    }
+
+    fn is_client(&self) -> bool {
+        true
+    }
+
+    fn address(&self) -> Option<String> {
+        self.line.address().map(Address::to_string)
     }
 
     fn set_address(&mut self, address: &str) -> Option<Result<(), Mistake>> {

@@ -91,6 +91,14 @@ impl Serial {
 }
 
 impl Line {
+    /// The address of a line that is not serial.
+    pub(crate) const fn address(&self) -> Option<&Address> {
+        match self {
+            Self::Tcp(address) | Self::RtuOverTcp(address) | Self::Udp(address) => Some(address),
+            Self::Serial(_) => None,
+        }
+    }
+
     /// Replaces the address or the serial line of the driver.cfg, if `check` accepts the new address. The framing of an
     /// address is kept.
     ///

@@ -50,6 +50,14 @@ impl BusOptions for ClientOptions {
         Err(not_in_this_build(Self::NAME))
     }
 
+    fn is_client(&self) -> bool {
+        true
+    }
+
+    fn address(&self) -> Option<String> {
+        Some(self.url.address.to_string())
+    }
+
     fn set_address(&mut self, address: &str) -> Option<Result<(), Mistake>> {
         Some(self.set_address(address))
     }
@@ -139,6 +147,10 @@ impl BusOptions for ServerOptions {
     #[cfg(not(feature = "opcua"))]
     fn open(&self, _setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
         Err(not_in_this_build(Self::NAME))
+    }
+
+    fn address(&self) -> Option<String> {
+        Some(self.address.to_string())
     }
 
     fn set_address(&mut self, address: &str) -> Option<Result<(), Mistake>> {

@@ -70,6 +70,10 @@ impl BusOptions for ServerOptions {
         }
     }
 
+    fn address(&self) -> Option<String> {
+        Some(self.address.to_string())
+    }
+
     fn set_address(&mut self, address: &str) -> Option<Result<(), Mistake>> {
         Some(self.set_address(address))
     }
@@ -149,6 +153,14 @@ impl BusOptions for ClientOptions {
 
     fn cycle(&self) -> Option<Nanos> {
         Some(CYCLE)
+    }
+
+    fn is_client(&self) -> bool {
+        true
+    }
+
+    fn address(&self) -> Option<String> {
+        Some(self.address.to_string())
     }
 
     fn set_address(&mut self, address: &str) -> Option<Result<(), Mistake>> {

@@ -32,11 +32,6 @@ impl Options {
         self.kind
     }
 
-    /// Returns true if this end connects to the peer, and writes into a memory of it, which keeps the values.
-    pub fn is_client(&self) -> bool {
-        self.kind.ends_with("-client")
-    }
-
     /// Returns the recording that replaces the peer, as named in the driver.cfg.
     pub fn replayed(&self) -> Option<&Path> {
         match &self.downcast_ref::<loopback::Options>()?.peer {

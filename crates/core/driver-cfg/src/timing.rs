@@ -88,7 +88,7 @@ impl Line {
         Self {
             role,
             cycle: bus.and_then(|bus| bus.cycle()),
-            is_client: bus.is_some_and(Options::is_client),
+            is_client: bus.is_some_and(|bus| bus.is_client()),
         }
     }
 }

@@ -196,6 +196,16 @@ pub trait BusOptions: AnyOptions {
         Err("a peer on this bus does not list its tags; import the list of its editor".to_owned())
     }
 
+    /// True if this end connects to the peer and writes into a memory of it, which keeps the values.
+    fn is_client(&self) -> bool {
+        false
+    }
+
+    /// The host and port where this end connects or listens; `None` for a bus without one.
+    fn address(&self) -> Option<String> {
+        None
+    }
+
     /// The counters that show what the clients of a server do wrong; `None` for a bus that is no server.
     fn complaints(&self) -> Option<&'static [Complaint]> {
         None

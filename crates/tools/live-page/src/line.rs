@@ -54,6 +54,9 @@ pub(crate) struct Line<'a> {
     /// `server` if the peer connects to this end, `client` if this end connects; `None` if that is not known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) end: Option<&'static str>,
+    /// The host and port where it connects or listens.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) address: Option<String>,
     /// True if the line has ever come up.
     pub(crate) has_run: bool,
     /// The time until the bus is tried again after a failure.
@@ -93,6 +96,7 @@ impl<'a> Line<'a> {
             facts: Vec::new(),
             stations: Vec::new(),
             end: None,
+            address: None,
             has_run: state == LinkState::Running,
             next_ms: None,
             events: Vec::new(),
@@ -210,6 +214,7 @@ pub(crate) fn json(
         silence_ms: (silence != Nanos::MAX).then_some(silence.0 / 1_000_000),
         stations,
         end: end_of(watch),
+        address: address_of(watch, statistics),
         has_run: watch.has_run(),
         next_ms: watch.next_attempt().map(|next| whole_millis(next - now)),
         events: events::last([events::of_line(watch, now), fault_events].concat()),
@@ -241,6 +246,17 @@ fn end_of(watch: &Watch) -> Option<&'static str> {
         return Some("server");
     }
     bus.is_client().then_some("client")
+}
+
+/// Where the line connects or listens: as the bus tells it, with the port that the system chose, or as configured.
+fn address_of(watch: &Watch, statistics: &Statistics) -> Option<String> {
+    let told = statistics.iter().find(|(key, _)| *key == "address");
+    if let Some((_, Value::Text(address))) = told {
+        return Some(address.clone());
+    }
+    let bus = &watch.config().bus;
+    let is_same = bus.kind() == watch.bus_kind();
+    bus.address().filter(|_| is_same)
 }
 
 /// Sorts statistics into counters, distributions and texts.

@@ -47,8 +47,9 @@ const outage = (() => {
     const [peer, , , own] = names(driver);
     const the = peer === "PLC" ? "The PLC" : "The machine";
     const them = `the ${peer === "PLC" ? "PLC" : "machine"}`;
-    const address = line.texts.address ?? "";
-    const port = /:(\d+)\b/.exec(address || line.reason)?.[1];
+    // A line with several stations may have several.
+    const [address] = (line.address ?? "").split(" ");
+    const port = /:(\d+)$/.exec(address)?.[1];
     const check = line.end === "client"
       ? `Start ${them}, or look with “tickbus doctor”.`
       : `Look at cable, switch and ${peer}; “tickbus doctor” looks at each step.`;
@@ -75,8 +76,7 @@ const outage = (() => {
       return { at: 0, word: "has not come yet", isApart: true, what: `No ${peer === "PLC" ? "PLC" : "machine"} has connected${where} yet`, act: peer === "PLC" ? enter + near : "Start it." };
     }
     if (line.end === "client" && line.cause === "link") {
-      const at = /\S*[\w\]]:\d+/.exec(line.reason)?.[0] ?? address;
-      return { at: 0, word: "no reply", isApart: true, what: `Nothing answers${at ? ` at ${at}` : ""}`, act: check };
+      return { at: 0, word: "no reply", isApart: true, what: `Nothing answers${address ? ` at ${address}` : ""}`, act: check };
     }
     if (line.cause === "silent" || line.status === "stale" && line.state === "running") return { at: 1, word: "silent", what: `Nothing comes from ${them} any more`, act: check };
     if (line.state === "opening") return { at: 1, word: "not up yet", what: "The line is not up yet", act: check };
@@ -143,7 +143,7 @@ const outage = (() => {
     if (!own) return;
     own.driver = driver;
     if (line.heard !== own.line?.heard) own.heard = Date.now();
-    own.line = { ...line, events: line.events ?? [], texts: line.texts ?? {} };
+    own.line = { ...line, events: line.events ?? [] };
     line = own.line;
     const wrong = diagnose(own.driver, beneath(line));
     own.boxes.forEach(({ it, mark, text }, i) => {

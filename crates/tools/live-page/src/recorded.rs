@@ -1,5 +1,6 @@
 //! A recording on the page: the signals of a file, after the fact. Nothing runs, and nothing can be forced.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use tickbus_base::Mistake;
@@ -30,6 +31,8 @@ pub struct Recorded {
     broken: Option<String>,
     ticks: u64,
     picture: Option<Picture>,
+    /// Signals of which the recording has edges, but no driver.cfg says of which kind.
+    guessed_latches: BTreeSet<String>,
 }
 
 impl Recorded {
@@ -57,7 +60,8 @@ impl Recorded {
                 .collect(),
             ..given.clone()
         };
-        let signals = signals(&columns, table);
+        let mut guessed_latches = BTreeSet::new();
+        let signals = signals(&columns, table, &mut guessed_latches);
         let faults = positions(&signals, faults)?;
         let role = columns.role.clone();
         let stations = if columns.stations.is_empty() {
@@ -116,6 +120,7 @@ impl Recorded {
             broken,
             ticks,
             picture: None,
+            guessed_latches,
         })
     }
 
@@ -229,8 +234,12 @@ fn reads(name: &str) -> Option<Area> {
 }
 
 /// The signals of a recording. The table adds what the file does not have, if its signal has the type of the file.
-fn signals(columns: &Columns, table: Option<&SignalTable>) -> Vec<Signal> {
-    let of = |column: &Column| {
+fn signals(
+    columns: &Columns,
+    table: Option<&SignalTable>,
+    guessed_latches: &mut BTreeSet<String>,
+) -> Vec<Signal> {
+    let mut of = |column: &Column| {
         let station = |name: &String| columns.stations.iter().position(|known| known == name);
         let station = station(&column.station).unwrap_or(0);
         let known = table.and_then(|table| Some(&table.signals[table.position(&column.name)?]));
@@ -243,11 +252,12 @@ fn signals(columns: &Columns, table: Option<&SignalTable>) -> Vec<Signal> {
         // The recording has edges, but not of which kind.
         if signal.latch.is_none() && columns.position(&column.name, true).is_some() {
             signal.latch = Some(Latch::Both);
+            guessed_latches.insert(signal.name.clone());
         }
         signal
     };
     let all = columns.columns.iter().filter(|column| !column.is_edges);
-    all.map(of).collect()
+    all.map(&mut of).collect()
 }
 
 /// A signal as the file describes it.
@@ -389,9 +399,10 @@ impl Exhibit for ShownRecording {
                     Area::Output => "Q",
                 }),
                 latch: signal.latch.map(|latch| match latch {
+                    _ if self.recorded.guessed_latches.contains(&signal.name) => "recorded",
                     Latch::Rising => "rising",
                     Latch::Falling => "falling",
-                    Latch::Both => "recorded",
+                    Latch::Both => "both",
                 }),
                 reply: None,
                 writable: false,

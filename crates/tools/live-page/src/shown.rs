@@ -21,6 +21,9 @@ use crate::picture::Picture;
 use crate::sheet::{DriverJson, FAIL_SAFE, FORCED, Row, STALE, Sheet, SignalJson, UNKNOWN};
 use crate::value::{Number, parse};
 
+/// A simulation that has not ticked for this long stands still.
+const SILENT: Nanos = Nanos::from_millis(500);
+
 /// A driver on the page.
 #[derive(Debug)]
 pub(crate) struct Shown {
@@ -167,7 +170,13 @@ impl Shown {
         self.statistics = self.watch.statistics();
         self.link = link;
         let archive = self.archive.as_ref();
-        let events = archive.map_or_else(Vec::new, |archive| archive.fault_events());
+        // The time of the history stands still while the simulation does not tick. A copy that is asked for comes with the
+        // next tick, so that a short silence means nothing.
+        let silence = match self.watch.silence() {
+            silence if silence >= SILENT && silence < Nanos::MAX => silence,
+            _ => Nanos::ZERO,
+        };
+        let events = archive.map_or_else(Vec::new, |archive| archive.fault_events(silence));
         let line = line::json(self.id, &self.watch, &self.link, &self.statistics, events);
         self.sheet.set_line(now, number, line);
         true

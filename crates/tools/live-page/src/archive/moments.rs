@@ -36,11 +36,12 @@ impl Archive {
         }))
     }
 
-    /// The faults that have begun and ended lately.
-    pub(crate) fn fault_events(&self) -> Vec<Event> {
+    /// The faults that have begun and ended lately, as of a time after the last tick.
+    pub(crate) fn fault_events(&self, since_tick: Nanos) -> Vec<Event> {
         let span = self.history.span();
         span.map_or_else(Vec::new, |span| {
-            events_of(&self.last_marks(events::MOST, is_fault), span.last.1)
+            let now = span.last.1 + since_tick;
+            events_of(&self.last_marks(events::MOST, is_fault), now)
         })
     }
 }

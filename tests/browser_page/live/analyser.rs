@@ -356,3 +356,62 @@ fn a_signal_is_dropped_and_leaves_and_the_axis_fits_a_phone_in_the_dark() {
     browser.wait(hidden);
     assert_quiet(&browser);
 }
+
+#[test]
+fn the_axis_is_there_again_after_a_reload() {
+    let machine = worked();
+    let browser = opened(&machine, 1280, 800);
+    browser.run("analyser.tracks[2].parts.states.click(); analyser.zoom(0.5)");
+    let axis = "return [analyser.tracks.map(({ signal, states }) => [signal.name, states]), analyser.view.end - analyser.view.begin]";
+    let before = browser.run(axis);
+    browser.run("location.reload()");
+    browser.wait("window.tickbusPage?.painted && analyser.tracks.length === 3 && analyser.tracks[1].times.length > 1");
+    let after = browser.run(axis);
+    assert_eq!(after[0], before[0]);
+    let [before, after] = [&before[1], &after[1]].map(|span| span.as_f64().expect("a time"));
+    assert!((before - after).abs() < 1e-3, "{before} and {after}");
+    assert_quiet(&browser);
+}
+
+#[test]
+fn a_trigger_asks_again_for_changes_that_were_too_many() {
+    let machine = worked();
+    let browser = opened(&machine, 1280, 800);
+    // The server gives the extremes alone of many changes; here, of more than three.
+    browser.run(
+        "const ask = room.ask; window.thinned = 0; \
+         const gate = new Promise((go) => { window.letGo = go; }); \
+         room.ask = async (path, options) => { \
+           if (!path.startsWith('/trend/')) return ask(path, options); \
+           await gate; \
+           const answer = await ask(path, options); \
+           const news = await answer.json(); \
+           for (const it of Object.values(news.signals)) { \
+             if (it.ms.length <= 3) continue; \
+             thinned += 1; \
+             const last = it.ms.length - 1; \
+             Object.assign(it, { is_thin: true, ms: [0, last >> 1, last].map((i) => it.ms[i]), values: [1, 1, 1] }); \
+           } \
+           return { ok: true, json: async () => news }; \
+         }",
+    );
+    let lows = "(await (await fetch('/trend/' + plant.drivers[0].id + '/' + plant.signals.find((it) => it.name === 'Level low').index)).json())";
+    let known = browser.run(&format!("return {lows}.ms.length"));
+    arm(&browser, "Level low", "rises", "");
+    browser.wait("trigger.isArmed");
+    for valve in ["0", "1", "0", "1", "0", "1"] {
+        machine.write("0", "0", valve);
+        let shown = if valve == "0" { "FALSE" } else { "TRUE" };
+        wait_shown(&browser, "Level low", shown);
+    }
+    browser.run("letGo()");
+    wait_said(&browser, "Level low rose");
+    let told = browser.run(&format!(
+        "return [trigger.isArmed, thinned > 0, bar.moment?.ms ?? analyser.view.end, {lows}]"
+    ));
+    assert_eq!((&told[0], &told[1]), (&json!(false), &json!(true)));
+    let first = known.as_u64().and_then(|known| usize::try_from(known).ok());
+    let rise = &told[3]["ms"][first.expect("a number") + 1];
+    browser.wait(&format!("Math.abs(bar.moment?.ms - {rise}) < 1e-6"));
+    assert_quiet(&browser);
+}

@@ -333,3 +333,74 @@ fn the_buttons_in_the_drawing_of_a_training_machine_work() {
     }
     assert_quiet(&browser);
 }
+
+#[test]
+fn the_drawings_of_the_demos_have_buttons_and_switches_that_work() {
+    let folder = crate::screenshots();
+    for (name, config, picture, controls) in [
+        (
+            "rig",
+            include_str!("../../../driver.cfg"),
+            include_str!("../../../java/machines/rig.svg"),
+            &["Start button, push-button", "Stop button, push-button", "Reset button, push-button"][..],
+        ),
+        (
+            "bottle-rig",
+            include_str!("../../../examples/machines/bottle-rig/driver.cfg"),
+            include_str!("../../../examples/machines/bottle-rig/picture.svg"),
+            &["Start button, push-button", "Stop button, push-button", "Reset button, push-button"],
+        ),
+        (
+            "cell",
+            include_str!("../../../plc/cell/cell.cfg"),
+            include_str!("../../../java/machines/cell.svg"),
+            &["S1 rearm, push-button", "S1 start, switch", "S1 emergency, switch"],
+        ),
+        (
+            "board",
+            include_str!("../../../plc/lab/board.cfg"),
+            include_str!("../../../java/machines/board.svg"),
+            &["switch 1, switch", "switch 2, switch", "switch 3, switch", "switch 4, switch"],
+        ),
+    ] {
+        let temporary = tempfile::tempdir().expect("a folder");
+        let signals = config.split_once("[[signal]]").expect("signals").1;
+        let signals = signals.split("\n[[reply]]").next().expect("signals");
+        let config = format!(
+            "[driver]\nid = 1\nname = \"{name}\"\n[fieldbus]\nkind = \"modbus-server\"\naddress = \"127.0.0.1:0\"\n\
+             [page]\nlisten = \"127.0.0.1:0\"\npicture = \"picture.svg\"\n[[signal]]{signals}"
+        );
+        // Of the dispatcher alone.
+        let config = config.replace("dead_band = 0.1\n", "");
+        std::fs::write(temporary.path().join("tank.cfg"), config)
+            .and_then(|()| std::fs::write(temporary.path().join("picture.svg"), picture))
+            .expect("there is room");
+        let machine = Machine::start(std::sync::Arc::new(temporary));
+        let browser = open(&machine, 1280, 800);
+        let root = "document.querySelector('.picture > div > div')?.shadowRoot";
+        for control in controls {
+            let (signal, kind) = control.rsplit_once(", ").expect("its kind");
+            let script = format!("{root}?.querySelector('[aria-label={}]')", json!(control));
+            browser.wait(&script);
+            let found = browser.run(&format!(
+                "const box = {script}.querySelector('text').getBoundingClientRect(); \
+                 return [Math.round(box.left + box.width / 2), Math.round(box.top + box.height / 2)]"
+            ));
+            let act = |actions: Value| {
+                browser.act(&json!([{"type": "pointer", "id": "mouse", "actions": actions}]));
+            };
+            let to = json!({"type": "pointerMove", "x": found[0], "y": found[1], "duration": 0});
+            act(json!([to, {"type": "pointerDown", "button": 0}]));
+            if kind == "push-button" {
+                wait_marked(&browser, signal, "forced");
+                wait_shown(&browser, signal, "TRUE");
+            }
+            act(json!([{"type": "pointerUp", "button": 0}]));
+            wait_marked(&browser, signal, if kind == "switch" { "forced" } else { "" });
+        }
+        let told = "return document.querySelectorAll('.picture details').length";
+        assert_eq!(browser.run(told), 0, "{name}: nothing is left out or wrong");
+        shoot(&browser, folder.as_deref(), &format!("touch-{name}.png"), false);
+        assert_quiet(&browser);
+    }
+}

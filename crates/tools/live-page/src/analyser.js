@@ -22,6 +22,8 @@ const analyser = (() => {
   /** A nanosecond, in milliseconds: times of two drivers are converted into each other, and rounded. */
   const TINY = 1e-6;
   const KIND = "application/x-tickbus-signal";
+  /** Where this tab keeps the signals and the length of the axis for the next load of the page. */
+  const STORE = "tickbus analyser";
   const plot = get("plot");
   const canvas = get("waves");
   let act = {};
@@ -50,7 +52,9 @@ const analyser = (() => {
     const end = held ?? plant.now(bar.lead);
     return { begin: end - span, end };
   }
-  const width = () => Math.max(20, plot.clientWidth - MARGIN);
+  // Asked for in each frame, it would make the browser lay out the page once more.
+  let plotWidth = 0;
+  const width = () => Math.max(20, plotWidth - MARGIN);
   const timeAt = (x) => view().begin + x / width() * span;
   const first = () => pending?.ms ?? bar.moment?.ms ?? null;
 
@@ -104,9 +108,11 @@ const analyser = (() => {
     act.redraw();
   }
 
+  window.addEventListener("pagehide", keep);
+
   // The signals.
 
-  const trackOf = (signal) => ({ key: plant.keyOf(signal), signal, times: [], values: [], from: Infinity, until: -Infinity, isThin: false, states: null });
+  const trackOf = (signal) => ({ key: plant.keyOf(signal), signal, times: [], values: [], from: Infinity, until: -Infinity, isThin: false, states: null, mayBeStates: !signal.unit && !/REAL|TIME|BOOL/.test(signal.type) });
 
   function add(signal) {
     if (!signal) return act.say("Choose a signal first.", true);
@@ -167,10 +173,25 @@ const analyser = (() => {
     collect();
   }
 
+  function keep() {
+    const kept = tracks.map(({ key, states }) => ({ key, states }));
+    sessionStorage.setItem(STORE, JSON.stringify({ tracks: kept, span }));
+  }
+
+  function kept() {
+    try {
+      return JSON.parse(sessionStorage.getItem(STORE)) ?? { tracks: [], span };
+    } catch {
+      return { tracks: [], span };
+    }
+  }
+
   /** After the signals were replaced. */
   function renew() {
     const known = new Map(plant.signals.map((signal) => [plant.keyOf(signal), signal]));
-    tracks = tracks.filter(({ key }) => known.has(key)).map(({ key, states }) => ({ ...trackOf(known.get(key)), states }));
+    const before = tracks.length ? { tracks, span } : kept();
+    ({ span } = before);
+    tracks = before.tracks.filter(({ key }) => known.has(key)).map(({ key, states }) => ({ ...trackOf(known.get(key)), states }));
     [second, held, pending] = [null, null, null];
     build();
   }
@@ -344,7 +365,7 @@ const analyser = (() => {
     return true;
   }
 
-  const isStates = (track) => track.states ?? (track.isFew && !track.signal.unit && !/REAL|TIME|BOOL/.test(track.signal.type));
+  const isStates = (track) => track.states ?? track.isFew;
 
   function valueText(track, value) {
     const shown = words.value({ ...track.signal, value: Number.isNaN(value) ? null : value });
@@ -389,7 +410,7 @@ const analyser = (() => {
     const seen = { times: times.slice(start, stop), values: values.slice(start, stop) };
     trend.paintUnknown(painted, seen, row - 1);
     ctx.restore();
-    track.isFew = isFew(seen.values);
+    track.isFew = track.mayBeStates && isFew(seen.values);
     track.range = "";
     if (signal.isBool) {
       paintBool(painted, seen, high, low);
@@ -462,7 +483,7 @@ const analyser = (() => {
       }
     }
     const told = [];
-    const cursor = (name, ms, tick) => `${name}: ${words.moment(ms)}${tick === null ? "" : `, tick ${tick.toLocaleString("en")}`}`;
+    const cursor = (name, ms, tick) => `${name}: ${words.moment(ms)}${tick === null ? "" : `, tick ${words.whole(tick)}`}`;
     const tick = pending === null ? bar.moment?.tick ?? null : null;
     if (one !== null) told.push(cursor("1", one, tick));
     if (second) told.push(cursor("2", second.ms, second.tick));
@@ -604,7 +625,10 @@ const analyser = (() => {
     add(plant.signals.find((signal) => plant.keyOf(signal) === key));
   });
 
-  const sizes = new ResizeObserver(() => { if (tracks.length) fit(); });
+  const sizes = new ResizeObserver(() => {
+    plotWidth = plot.clientWidth;
+    if (tracks.length) fit();
+  });
   for (const it of [plot, get("axis")]) sizes.observe(it);
   return {
     add, renew, redraw, moved, stop, follow, zoom, pan, all, toEdge,

@@ -25,6 +25,9 @@ const bar = (() => {
   let overview = { outages: [], marks: [] };
   let looked = -Infinity;
   let colours = null;
+  /** The width of the bands in pixels, and what they were painted from. */
+  let width = 0;
+  let painted = [];
   /** For measurements: how long the moments took from the request to the picture, in milliseconds. */
   const frames = [];
 
@@ -189,11 +192,15 @@ const bar = (() => {
     }
   }
 
+  /** Paints the bands, if they have changed. */
   function paint() {
-    colours ??= coloursAt(document.body);
-    const [width, height] = [get("track").clientWidth, 10];
-    const ctx = context(canvas, width, height);
     const { first, last } = lead.past;
+    const now = [width, first, last, overview, colours];
+    if (colours && now.every((it, i) => it === painted[i])) return;
+    colours ??= coloursAt(document.body);
+    painted = [width, first, last, overview, colours];
+    const height = 10;
+    const ctx = context(canvas, width, height);
     // As wide as the way of the handle.
     const x = (ms) => 8 + (ms - first) / Math.max(1, last - first) * (width - 16);
     ctx.fillStyle = colours.idle;
@@ -207,6 +214,12 @@ const bar = (() => {
     ctx.fillStyle = colours.bad;
     for (const { ms, begins } of overview.marks) if (begins && ms >= first) ctx.fillRect(x(ms) - 1, 0, 2, height);
   }
+
+  // Asking for it in each frame would make the browser lay out the page once more.
+  new ResizeObserver(([{ contentRect }]) => {
+    ({ width } = contentRect);
+    if (lead?.past) paint();
+  }).observe(get("track"));
 
   /** Shows the state of the bar. */
   function redraw() {
@@ -237,7 +250,7 @@ const bar = (() => {
     get("pause").hidden = Boolean(moment) || isFile;
     get("to-live").hidden = !moment || isFile;
     if (moment) write(get("to-live"), `Live: +${words.span(ago)}`);
-    write(get("moment"), moment ? `${words.moment(at)}${isFile ? ` of ${words.moment(last)}` : ""} · tick ${moment.tick.toLocaleString("en")}` : isCut ? `the last ${span} kept` : `${span} recorded`);
+    write(get("moment"), moment ? `${words.moment(at)}${isFile ? ` of ${words.moment(last)}` : ""} · tick ${words.whole(moment.tick)}` : isCut ? `the last ${span} kept` : `${span} recorded`);
     const chosen = act.chosen();
     write(get("goal-signal"), chosen ? `change of ${chosen.name}` : "change of a signal");
     if (moment && moment.ms < first && !moment.isTold) {

@@ -90,7 +90,7 @@ const line = (() => {
     rows.forEach((cells, i) => cells.forEach((cell, j) => write(table.tBodies[0].rows[i].cells[j], cell)));
   }
 
-  const figures = (number) => (Number.isInteger(number) ? number.toLocaleString("en") : String(number));
+  const figures = (number) => (Number.isInteger(number) ? words.whole(number) : String(number));
   const byName = ([a], [b]) => (a < b ? -1 : 1);
 
   function facts(card, line) {

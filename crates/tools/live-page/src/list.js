@@ -52,7 +52,7 @@ const list = (() => {
     layOut();
     chosenRow = rows.findIndex((row) => row.kind === "signal" && row.signal === chosen);
     const all = plant.signals.length;
-    document.getElementById("found").textContent = found === all ? words.count(all, "signal", "signals") : `${found.toLocaleString("en")} of ${words.count(all, "signal", "signals")}`;
+    document.getElementById("found").textContent = found === all ? words.count(all, "signal", "signals") : `${words.whole(found)} of ${words.count(all, "signal", "signals")}`;
     const empty = document.getElementById("empty");
     empty.hidden = found > 0 || all === 0;
     const nothing = { forced: "No signal is forced.", failsafe: "No signal has its fail-safe value." };
@@ -71,10 +71,7 @@ const list = (() => {
   function redraw() {
     if (isDue) return;
     isDue = true;
-    requestAnimationFrame(() => {
-      isDue = false;
-      draw();
-    });
+    requestAnimationFrame(() => { if (isDue) draw(); });
   }
 
   /** The visible range of the rows, whichever element scrolls. */
@@ -85,7 +82,9 @@ const list = (() => {
     return [top, Math.min(window.innerHeight, own.bottom) - box.top];
   }
 
+  /** Draws at once. It reads the layout first: within a frame before anything is written. */
   function draw() {
+    isDue = false;
     const begun = performance.now();
     const [top, bottom] = seen();
     const first = Math.max(0, indexAt(tops, top - 80));
@@ -191,7 +190,7 @@ const list = (() => {
   /** The changes of a signal without a latch that the other side never saw. */
   function swallowed({ driver, name }) {
     const count = driver.line?.counters?.[`swallowed.${name.replace(/[=\\]/g, "\\$&")}`];
-    return count ? `${Number(count).toLocaleString("en")} swallowed` : "";
+    return count ? `${words.whole(Number(count))} swallowed` : "";
   }
 
   const paint = {
@@ -212,7 +211,7 @@ const list = (() => {
       text(element, "number", value);
       text(element, "unit", signal.unit);
       text(element, "raw", signal.isBool ? "" : signal.raw);
-      text(element, "edges", signal.latch ? signal.edges.toLocaleString("en") : swallowed(signal));
+      text(element, "edges", signal.latch ? words.whole(signal.edges) : swallowed(signal));
       text(element, "age", words.span(plant.age(signal)));
       text(element, "mark", signal.isForced ? "forced" : signal.isFailSafe ? "fail-safe" : signal.isStale ? "stale" : "");
       text(element, "open", signal.isOpen ? "▾" : "▸");
@@ -341,7 +340,7 @@ const list = (() => {
   });
 
   return {
-    choose, redraw, select, find, toggle, isMoving, drawn,
+    choose, redraw, draw, select, find, toggle, isMoving, drawn,
     filter(text) {
       wanted = text.toLowerCase().split(/\s+/).filter(Boolean);
       choose();

@@ -273,8 +273,8 @@
     requestAnimationFrame(() => {
       isDue = false;
       views.redraw();
+      list.draw();
       alarm();
-      list.redraw();
       pads.redraw();
       bar.redraw();
       analyser.redraw();

@@ -272,5 +272,10 @@ const words = {
     if (us < 1000) return `${Number(us.toPrecision(3))} µs`;
     return us < 1e6 ? `${Number((us / 1e3).toPrecision(3))} ms` : `${Number((us / 1e6).toPrecision(3))} s`;
   },
-  count: (number, one, many) => `${number.toLocaleString("en")} ${number === 1 ? one : many}`,
+  /** A whole number with commas. Its format is made once: toLocaleString makes one each time. */
+  whole: (() => {
+    const format = new Intl.NumberFormat("en");
+    return (number) => format.format(number);
+  })(),
+  count: (number, one, many) => `${words.whole(number)} ${number === 1 ? one : many}`,
 };

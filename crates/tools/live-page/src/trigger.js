@@ -53,17 +53,32 @@ const trigger = (() => {
     show();
   }
 
-  /** Looks at the changes since the last look. */
+  /** Looks at all changes since the last look. */
   async function look() {
-    if (!armed) return;
     const own = armed;
-    const { signal } = own;
-    const answer = await room.ask(`/trend/${signal.driver.id}/${signal.index}/${own.until}/${FAR}`);
-    if (answer.ok && armed === own) take(own, await answer.json());
+    // Of too many changes the server has the extremes alone: it is asked again, for shorter times.
+    for (let to = FAR; own && armed === own;) {
+      const { driver, index } = own.signal;
+      const answer = await room.ask(`/trend/${driver.id}/${index}/${own.until}/${to}`);
+      if (!answer.ok || armed !== own) return;
+      const news = await answer.json();
+      const given = news.signals[index];
+      const next = given.ms.find((ms) => ms > own.until);
+      if (given.is_thin && next < given.ms.at(-1)) {
+        to = Math.max(next, given.ms[given.ms.length >> 2]);
+        continue;
+      }
+      if (given.ms[0] > own.until) {
+        act.say("Waits on; but the oldest changes have left the memory (history in [page]), and the signal may have done it among them.", true);
+        own.was = NaN;
+      }
+      take(own, news.to_ms, given);
+      if (to === FAR) return;
+      to = FAR;
+    }
   }
 
-  function take(own, { to_ms: until, signals: given }) {
-    const { ms, values } = given[own.signal.index];
+  function take(own, until, { ms, values }) {
     const { fits, done, hasLimit } = CASES[own.name];
     for (let i = 0; i < ms.length; i++) {
       const is = values[i] ?? NaN;

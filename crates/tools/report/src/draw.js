@@ -60,35 +60,36 @@ function valueText(signal, value, digits) {
 const place = (painting, time) =>
   painting.left + (time - painting.from) / (painting.to - painting.from) * painting.width;
 
+/** The thickness of traces, in pixels. */
+const THICK = 1.5;
+
+/**
+ * Traces are horizontal and vertical lines, drawn as rectangles: without a graphics card, browsers take fifty times as long to
+ * stroke a path of them.
+ */
+const across = (ctx, x, end, y) => ctx.fillRect(x, y - THICK / 2, end - x, THICK);
+const upright = (ctx, x, from, to) => ctx.fillRect(x - THICK / 2, Math.min(from, to) - THICK / 2, THICK, Math.abs(to - from) + THICK);
+
 /** The trace of a bool between `top` and `bottom`. */
 function paintBool(painting, data, top, bottom) {
   const { ctx, colours, left, width, from, to } = painting;
   const { times } = data;
   const first = indexAt(times, from);
   const last = indexAt(times, to);
-  const fills = new Path2D();
-  const busy = new Path2D();
-  const lines = new Path2D();
-  const level = (value) => (value > 0.5 ? top : bottom);
+  /** Levels, `[value, begin, end]`, and the places of edges. */
+  const levels = [];
+  const edges = [];
+  const busy = [];
   // Next to a time without a value, a change is unknown.
   const isEdge = (i) => i >= 0 && !Number.isNaN(valueOf(data, i)) && !Number.isNaN(valueOf(data, i + 1));
-  function segment(value, x, end) {
-    if (Number.isNaN(value)) return;
-    const y = level(value);
-    if (value > 0.5) fills.rect(x, top, end - x, bottom - top);
-    lines.moveTo(x, y);
-    lines.lineTo(end, y);
-  }
+  const segment = (value, x, end) => { if (!Number.isNaN(value)) levels.push([value > 0.5, x, end]); };
   const edge = Math.min(left + width, place(painting, run.end));
   if (last - first <= width / 4) {
     let x = Math.max(left, place(painting, 0));
     for (let i = first; i <= last; i++) {
       const end = i < last ? place(painting, times[i + 1]) : edge;
       segment(valueOf(data, i), x, end);
-      if (i < last && isEdge(i)) {
-        lines.moveTo(end, top);
-        lines.lineTo(end, bottom);
-      }
+      if (i < last && isEdge(i)) edges.push(end);
       x = end;
     }
   } else {
@@ -99,27 +100,24 @@ function paintBool(painting, data, top, bottom) {
     for (let x = 0; x < width; x++) {
       const next = indexAt(times, from + (x + 1) * step, Math.max(index, 0), last + 1);
       const now = next > index + 1 ? "busy" : valueOf(data, next);
-      if (next === index + 1 && isEdge(index)) {
-        lines.moveTo(left + x + 0.5, top);
-        lines.lineTo(left + x + 0.5, bottom);
-      }
+      if (next === index + 1 && isEdge(index)) edges.push(left + x + 0.5);
       if (!Object.is(now, was)) {
-        if (was === "busy") busy.rect(begin, top, left + x - begin, bottom - top);
+        if (was === "busy") busy.push([begin, left + x]);
         else segment(was, begin, left + x);
         [begin, was] = [left + x, now];
       }
       index = next;
     }
-    if (was === "busy") busy.rect(begin, top, left + width - begin, bottom - top);
+    if (was === "busy") busy.push([begin, left + width]);
     else segment(was, begin, edge);
   }
   ctx.fillStyle = colours.tint;
-  ctx.fill(fills);
+  for (const [isOn, x, end] of levels) if (isOn) ctx.fillRect(x, top, end - x, bottom - top);
   ctx.fillStyle = colours.busy;
-  ctx.fill(busy);
-  ctx.strokeStyle = colours.trace;
-  ctx.lineWidth = 1.5;
-  ctx.stroke(lines);
+  for (const [x, end] of busy) ctx.fillRect(x, top, end - x, bottom - top);
+  ctx.fillStyle = colours.trace;
+  for (const [isOn, x, end] of levels) across(ctx, x, end, isOn ? top : bottom);
+  for (const x of edges) upright(ctx, x, top, bottom);
 }
 
 /** The trace of numbers between `top` and `bottom`; a value holds until the next. */
@@ -135,23 +133,18 @@ function paintReal(painting, signal, data, top, bottom) {
     const share = size > 0 ? Math.min(1, Math.max(0, (value - low) / size)) : 0.5;
     return bottom - share * (bottom - top);
   };
-  const lines = new Path2D();
+  ctx.fillStyle = colours.analog;
   const edge = Math.min(left + width, place(painting, run.end));
   if (last - first <= 2 * width) {
     let x = Math.max(left, place(painting, 0));
-    let isDown = false;
+    let was = NaN;
     for (let i = first; i <= last; i++) {
       const end = i < last ? place(painting, times[i + 1]) : edge;
       const value = valueOf(data, i);
-      if (Number.isNaN(value)) {
-        isDown = false;
-      } else {
-        if (isDown) lines.lineTo(x, y(value));
-        else lines.moveTo(x, y(value));
-        lines.lineTo(end, y(value));
-        isDown = true;
-      }
-      x = end;
+      const now = Number.isNaN(value) ? NaN : y(value);
+      if (!Number.isNaN(was) && !Number.isNaN(now)) upright(ctx, x, was, now);
+      if (!Number.isNaN(now)) across(ctx, x, end, now);
+      [x, was] = [end, now];
     }
   } else {
     const step = (to - from) / width;
@@ -165,17 +158,10 @@ function paintReal(painting, signal, data, top, bottom) {
         least = Math.min(least, held);
         most = Math.max(most, held);
       }
-      if (least <= most && left + x < edge) {
-        lines.moveTo(left + x + 0.5, Math.max(y(least), y(most) + 1));
-        lines.lineTo(left + x + 0.5, y(most));
-      }
+      if (least <= most && left + x < edge) upright(ctx, left + x + 0.5, y(least), y(most));
       index = next;
     }
   }
-  ctx.strokeStyle = colours.analog;
-  ctx.lineWidth = 1.5;
-  ctx.lineJoin = "bevel";
-  ctx.stroke(lines);
 }
 
 /** Paints durations: boxes with their text, also distinguished by their pattern. */

@@ -69,7 +69,9 @@ fn main() {
     quantiles("scrub", &browser.run("return bar.frames"));
     quantiles("scrub.frame", &browser.run("return gaps"));
     browser.run("for (const signal of plant.signals.slice(0, 24)) analyser.add(signal); bar.show('at/300000')");
-    browser.wait("analyser.tracks.length === 24 && analyser.tracks.every((it) => it.times.length > 100)");
+    browser.wait(
+        "analyser.tracks.length === 24 && analyser.tracks.every((it) => it.times.length > 100)",
+    );
     for (name, action) in [
         ("pan", "analyser.pan(i % 60 < 30 ? 0.02 : -0.02)"),
         ("zoom", "analyser.zoom(i % 120 < 60 ? 1.05 : 1 / 1.05)"),

@@ -342,25 +342,42 @@ fn the_drawings_of_the_demos_have_buttons_and_switches_that_work() {
             "rig",
             include_str!("../../../driver.cfg"),
             include_str!("../../../java/machines/rig.svg"),
-            &["Start button, push-button", "Stop button, push-button", "Reset button, push-button"][..],
+            &[
+                "Start button, push-button",
+                "Stop button, push-button",
+                "Reset button, push-button",
+            ][..],
         ),
         (
             "bottle-rig",
             include_str!("../../../examples/machines/bottle-rig/driver.cfg"),
             include_str!("../../../examples/machines/bottle-rig/picture.svg"),
-            &["Start button, push-button", "Stop button, push-button", "Reset button, push-button"],
+            &[
+                "Start button, push-button",
+                "Stop button, push-button",
+                "Reset button, push-button",
+            ],
         ),
         (
             "cell",
             include_str!("../../../plc/cell/cell.cfg"),
             include_str!("../../../java/machines/cell.svg"),
-            &["S1 rearm, push-button", "S1 start, switch", "S1 emergency, switch"],
+            &[
+                "S1 rearm, push-button",
+                "S1 start, switch",
+                "S1 emergency, switch",
+            ],
         ),
         (
             "board",
             include_str!("../../../plc/lab/board.cfg"),
             include_str!("../../../java/machines/board.svg"),
-            &["switch 1, switch", "switch 2, switch", "switch 3, switch", "switch 4, switch"],
+            &[
+                "switch 1, switch",
+                "switch 2, switch",
+                "switch 3, switch",
+                "switch 4, switch",
+            ],
         ),
     ] {
         let temporary = tempfile::tempdir().expect("a folder");
@@ -396,11 +413,20 @@ fn the_drawings_of_the_demos_have_buttons_and_switches_that_work() {
                 wait_shown(&browser, signal, "TRUE");
             }
             act(json!([{"type": "pointerUp", "button": 0}]));
-            wait_marked(&browser, signal, if kind == "switch" { "forced" } else { "" });
+            wait_marked(
+                &browser,
+                signal,
+                if kind == "switch" { "forced" } else { "" },
+            );
         }
         let told = "return document.querySelectorAll('.picture details').length";
         assert_eq!(browser.run(told), 0, "{name}: nothing is left out or wrong");
-        shoot(&browser, folder.as_deref(), &format!("touch-{name}.png"), false);
+        shoot(
+            &browser,
+            folder.as_deref(),
+            &format!("touch-{name}.png"),
+            false,
+        );
         assert_quiet(&browser);
     }
 }

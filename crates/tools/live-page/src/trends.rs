@@ -50,7 +50,9 @@ struct Trends {
 /// The trends of signals: `INDEX,INDEX/FROM/TO`, or `INDEX` for the last minutes.
 pub(crate) fn document(archive: &Archive, path: &str) -> Option<String> {
     let span = archive.history.span();
-    let (first, last) = span.map_or((Nanos::ZERO, Nanos::ZERO), |span| (span.first.1, span.last.1));
+    let (first, last) = span.map_or((Nanos::ZERO, Nanos::ZERO), |span| {
+        (span.first.1, span.last.1)
+    });
     let parts: Vec<&str> = path.split('/').collect();
     let (indices, from, to) = match parts[..] {
         [index] => (index, last - SPAN, last),
@@ -112,12 +114,14 @@ fn collect(
         .filter(|place| archive.has_forces(indices[*place]))
         .map(|place| (place, Vec::new()))
         .collect();
-    archive.history.trends(&wanted, (from, to), |place, at, slot| {
-        match own.get_mut(&place) {
-            Some(own) => own.push((at, slot)),
-            None => all[place].push(at, value(indices[place], slot)),
-        }
-    });
+    archive
+        .history
+        .trends(&wanted, (from, to), |place, at, slot| {
+            match own.get_mut(&place) {
+                Some(own) => own.push((at, slot)),
+                None => all[place].push(at, value(indices[place], slot)),
+            }
+        });
     for (place, own) in own {
         for (at, slot) in archive.with_forces(indices[place], own, to) {
             all[place].push(at, value(indices[place], slot));
@@ -237,9 +241,15 @@ mod tests {
         assert_eq!((trend.ms[0], trend.ms.last()), (0.0, Some(&0.1)));
         assert!(trend.ms.is_sorted());
         for peak in (0..10).map(|n| n * 10_000 + 4_321) {
-            let at = trend.ms.iter().position(|ms| (ms * 1e6).round() == f64::from(peak));
+            let at = trend
+                .ms
+                .iter()
+                .position(|ms| (ms * 1e6).round() == f64::from(peak));
             let at = at.unwrap_or_else(|| panic!("{peak} is lost"));
-            assert_eq!(trend.values[at..at + 2], [f64::from(peak), -f64::from(peak + 1)]);
+            assert_eq!(
+                trend.values[at..at + 2],
+                [f64::from(peak), -f64::from(peak + 1)]
+            );
         }
     }
 

@@ -6,7 +6,6 @@
 //! references to them.
 
 mod block;
-mod trends;
 #[cfg(all(test, not(loom)))]
 #[allow(
     clippy::cast_possible_truncation,
@@ -15,6 +14,7 @@ mod trends;
     reason = "tests: random words and small whole numbers"
 )]
 mod tests;
+mod trends;
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

@@ -33,10 +33,8 @@ impl History {
         let mut begin = None;
         let mut has_begun = false;
         for block in self.blocks(from, to) {
-            let is_quiet = !block.has_turn
-                && !wanted
-                    .iter()
-                    .any(|(column, _)| block.has_changed(*column));
+            let is_quiet =
+                !block.has_turn && !wanted.iter().any(|(column, _)| block.has_changed(*column));
             if is_quiet && begin.is_some() {
                 continue;
             }
@@ -73,7 +71,9 @@ impl History {
                     (0..wanted.len()).for_each(look);
                 } else {
                     let touched = cursor.touched.iter();
-                    touched.filter_map(|column| places[*column]).for_each(&mut look);
+                    touched
+                        .filter_map(|column| places[*column])
+                        .for_each(&mut look);
                 }
             }
         }

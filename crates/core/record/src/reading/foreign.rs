@@ -221,7 +221,10 @@ impl<R: BufRead> ForeignReader<R> {
                 self.at = self.nanos(next)?;
             } else if let Some(command) = word.strip_prefix('$') {
                 // What is between these and $end are values.
-                if !matches!(command, "dumpvars" | "dumpall" | "dumpon" | "dumpoff" | "end") {
+                if !matches!(
+                    command,
+                    "dumpvars" | "dumpall" | "dumpon" | "dumpoff" | "end"
+                ) {
                     self.words(command)?;
                 }
             } else {
@@ -318,7 +321,9 @@ fn number(bits: &str, width: Option<usize>) -> Option<f64> {
 
 /// The femtoseconds of a `$timescale`, such as `10ns`.
 fn unit(text: &str) -> Result<i128, ReadError> {
-    let digits = text.find(|c: char| !c.is_ascii_digit()).unwrap_or(text.len());
+    let digits = text
+        .find(|c: char| !c.is_ascii_digit())
+        .unwrap_or(text.len());
     let (count, name) = text.split_at(digits);
     let femtos = match name {
         "s" => 1_000_000_000 * FEMTOS,
@@ -330,10 +335,13 @@ fn unit(text: &str) -> Result<i128, ReadError> {
         _ => 0,
     };
     let count: Option<i128> = count.parse::<u32>().ok().map(Into::into);
-    count.map(|count| count * femtos).filter(|unit| *unit > 0).ok_or_else(|| {
-        let what = format!("\"{}\" is no time scale", shown(text));
-        ReadError::new(what, "write one such as $timescale 1 ns $end")
-    })
+    count
+        .map(|count| count * femtos)
+        .filter(|unit| *unit > 0)
+        .ok_or_else(|| {
+            let what = format!("\"{}\" is no time scale", shown(text));
+            ReadError::new(what, "write one such as $timescale 1 ns $end")
+        })
 }
 
 /// The name, or with a number if it is taken. `names` has how often each was given.
@@ -411,7 +419,9 @@ mod tests {
         #250 0! bZ0 \" sbusy % r-2e3 $\n$comment words 1! $end\n#300\n\
         b1111111111111111111111111111111111111111 '\nU!\n#1000000";
 
-    fn open(text: &'static str) -> Result<(ForeignReader<&'static [u8]>, Columns), (ReadError, u64)> {
+    fn open(
+        text: &'static str,
+    ) -> Result<(ForeignReader<&'static [u8]>, Columns), (ReadError, u64)> {
         ForeignReader::open(text.as_bytes())
     }
 
@@ -420,7 +430,10 @@ mod tests {
         let (mut reader, columns) = open(text)?;
         let mut tick = Tick::new(&columns);
         let mut all = Vec::new();
-        while reader.next(&mut tick).map_err(|fault| (fault, reader.line()))? {
+        while reader
+            .next(&mut tick)
+            .map_err(|fault| (fault, reader.line()))?
+        {
             let values = tick.values.iter().map(|value| value.real());
             all.push((tick.number, tick.time.0, values.collect()));
         }
@@ -431,8 +444,9 @@ mod tests {
     fn every_variable_with_a_number_is_a_signal_of_its_scopes() {
         let (_, columns) = open(FILE).expect("VCD");
         let told = columns.columns.iter();
-        let told: Vec<(&str, &str)> =
-            told.map(|it| (&*it.name, it.data_type.expect("a type").name())).collect();
+        let told: Vec<(&str, &str)> = told
+            .map(|it| (&*it.name, it.data_type.expect("a type").name()))
+            .collect();
         let expected = [
             ("top.clk", "BOOL"),
             ("top.data", "USINT"),
@@ -455,8 +469,16 @@ mod tests {
             (1, 0, vec![x, x, 0.0, 1.5, x, 1.0, x, x]),
             (2, 1, vec![1.0, 10.0, -2.0, 1.5, 1.0, 0.0, x, x]),
             (3, 2, vec![0.0, x, -2.0, -2000.0, 0.0, 0.0, x, x]),
-            (4, 3, vec![x, x, -2.0, -2000.0, x, 0.0, 1_099_511_627_775.0, x]),
-            (5, 10_000, vec![x, x, -2.0, -2000.0, x, 0.0, 1_099_511_627_775.0, x]),
+            (
+                4,
+                3,
+                vec![x, x, -2.0, -2000.0, x, 0.0, 1_099_511_627_775.0, x],
+            ),
+            (
+                5,
+                10_000,
+                vec![x, x, -2.0, -2000.0, x, 0.0, 1_099_511_627_775.0, x],
+            ),
         ];
         assert_eq!(format!("{found:?}"), format!("{expected:?}"));
     }
@@ -469,18 +491,42 @@ mod tests {
             ("no VCD", 1, "\"no\" is no command of a header"),
             ("$comment x", 2, "the file ends within $comment"),
             ("$upscope $end", 1, "$upscope ends no scope"),
-            ("\n$timescale 3 weeks $end", 2, "\"3weeks\" is no time scale"),
+            (
+                "\n$timescale 3 weeks $end",
+                2,
+                "\"3weeks\" is no time scale",
+            ),
             ("$var wire 1 ! $end", 1, "$var is incomplete"),
-            ("$var wire many ! a $end", 1, "\"many\" is no number of bits"),
-            ("$var string 1 ! a $end $enddefinitions $end", 1, "the file has no variable with a number"),
+            (
+                "$var wire many ! a $end",
+                1,
+                "\"many\" is no number of bits",
+            ),
+            (
+                "$var string 1 ! a $end $enddefinitions $end",
+                1,
+                "the file has no variable with a number",
+            ),
             ("HEAD#x", 4, "\"#x\" is no time"),
             ("HEAD#5\n#4", 5, "the time goes back from 5 to 4"),
-            ("HEAD#18446744073709551615", 4, "the time 18446744073709551615 is beyond 292 years"),
-            ("HEAD1?", 4, "the value of \"?\", which the header does not have"),
+            (
+                "HEAD#18446744073709551615",
+                4,
+                "the time 18446744073709551615 is beyond 292 years",
+            ),
+            (
+                "HEAD1?",
+                4,
+                "the value of \"?\", which the header does not have",
+            ),
             ("HEADb12 !", 4, "\"b12\" is no value"),
             ("HEADrtwo !", 4, "\"rtwo\" is no value"),
             ("HEADq!", 4, "\"q!\" is no change of a value"),
-            ("HEADpU 0 0 !", 4, "values of ports (extended VCD) cannot be read"),
+            (
+                "HEADpU 0 0 !",
+                4,
+                "values of ports (extended VCD) cannot be read",
+            ),
         ] {
             let text = text.replace("HEAD", head).leak();
             let (fault, at) = ticks(text).expect_err(text);

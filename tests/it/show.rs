@@ -125,7 +125,7 @@ fn a_recording_is_a_page_with_every_moment_until_it_is_interrupted() {
 #[test]
 fn vcd_of_other_programs_is_a_page_as_well() {
     let folder = super::testing::repository().join("tests/it/vcd");
-    let told = "icarus.vcd: 10 signals, 18 ticks from 0ns to 82ns, in 1 MB of memory";
+    let told = "icarus.vcd: 10 signals, 24 ticks from 0s to 82ns, in 1 MB of memory";
     let (_icarus, _, url) = started(&folder, &["icarus.vcd"], told);
     let driver = &get(&url, "/signals")["drivers"][0];
     let signals = driver["signals"].as_array().expect("a list").iter();
@@ -150,7 +150,7 @@ fn vcd_of_other_programs_is_a_page_as_well() {
     assert_eq!(at["values"][0], json!([0, null]));
     assert_eq!(at["values"][5], json!([5, -3]));
 
-    let told = "pyvcd.vcd: 5 signals, 7 ticks from 0ns to 6ms, in 1 MB of memory";
+    let told = "pyvcd.vcd: 5 signals, 7 ticks from 0s to 6ms, in 1 MB of memory";
     let (_pyvcd, _, url) = started(&folder, &["pyvcd.vcd"], told);
     let driver = &get(&url, "/signals")["drivers"][0];
     let trend = get(&url, &format!("/trend/{}/3/0/9", driver["id"]));
@@ -200,7 +200,7 @@ fn wrong_input_is_told_with_what_to_do() {
         ),
         (
             &["other.vcd"],
-            "other.vcd:5: the value of \"b\", which the header does not have",
+            "other.vcd: line 5: the value of \"b\", which the header does not have",
         ),
         (
             &["cut.vcd"],

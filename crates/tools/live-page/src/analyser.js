@@ -40,6 +40,8 @@ const analyser = (() => {
   let shownMoment = null;
   let isSecond = false;
   let hasNews = false;
+  /** True once the signals of the last load of the page are there again. */
+  let isBegun = false;
   let asked = 0;
   const pointers = new Map();
   let gesture = null;
@@ -189,7 +191,8 @@ const analyser = (() => {
   /** After the signals were replaced. */
   function renew() {
     const known = new Map(plant.signals.map((signal) => [plant.keyOf(signal), signal]));
-    const before = tracks.length ? { tracks, span } : kept();
+    const before = isBegun ? { tracks, span } : kept();
+    isBegun ||= plant.signals.length > 0;
     ({ span } = before);
     tracks = before.tracks.filter(({ key }) => known.has(key)).map(({ key, states }) => ({ ...trackOf(known.get(key)), states }));
     [second, held, pending] = [null, null, null];

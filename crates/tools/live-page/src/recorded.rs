@@ -176,7 +176,11 @@ fn fill(
             Err(error) if ticks > 0 => {
                 return Ok((ticks, first, Some(format!("the rest is left out: {error}"))));
             }
-            Err(error) => return Err(error.mistake),
+            Err(error) => {
+                let line = error.line.map(|line| format!("line {line}: "));
+                let what = format!("{}{}", line.unwrap_or_default(), error.mistake.what);
+                return Err(Mistake::new(what, error.mistake.right));
+            }
         }
         let tick = if is_in_order {
             &read

@@ -102,6 +102,17 @@ pub(crate) fn millis(time: Nanos) -> f64 {
     time.0 as f64 / 1e6
 }
 
+/// The time that a text in milliseconds says.
+pub(crate) fn time(text: &str) -> Option<Nanos> {
+    let millis: f64 = text
+        .parse()
+        .ok()
+        .filter(|millis: &f64| millis.is_finite())?;
+    #[expect(clippy::cast_possible_truncation, reason = "a cast saturates")]
+    let nanos = (millis * 1e6).round() as i64;
+    Some(Nanos(nanos))
+}
+
 /// Adds an item, and drops the oldest one if there are too many.
 fn push<T>(list: &mut VecDeque<T>, item: T) {
     if list.len() == MOST {

@@ -5,12 +5,11 @@ use std::sync::Arc;
 use std::sync::mpsc::{Sender, channel};
 use std::thread::{self, JoinHandle};
 
-use tickbus_base::time::Nanos;
 use tickbus_record::{Format, Moment, Recording};
 use tickbus_report::{Contents, DEFAULT_BUDGET};
 use tickbus_web::{Answer, Document};
 
-use crate::archive::Archive;
+use crate::archive::{Archive, time};
 use crate::exhibit::Exhibit;
 use crate::model::Shared;
 use crate::trends;
@@ -120,17 +119,6 @@ fn moment(kind: &str, place: &str) -> Option<Moment> {
         "after" => place.parse().ok().map(Moment::After),
         _ => None,
     }
-}
-
-/// A time in milliseconds.
-pub(crate) fn time(text: &str) -> Option<Nanos> {
-    let millis: f64 = text
-        .parse()
-        .ok()
-        .filter(|millis: &f64| millis.is_finite())?;
-    #[expect(clippy::cast_possible_truncation, reason = "a cast saturates")]
-    let nanos = (millis * 1e6).round() as i64;
-    Some(Nanos(nanos))
 }
 
 /// The ticks from a time to that in the name of the file, as a file.

@@ -6,8 +6,7 @@ use serde::Serialize;
 use tickbus_base::time::Nanos;
 use tickbus_record::TrendPoint;
 
-use crate::archive::{Archive, millis};
-use crate::past::time;
+use crate::archive::{Archive, millis, time};
 use crate::value::Number;
 
 /// The length of a trend if none is asked for.
@@ -109,7 +108,7 @@ fn collect(
         slot.map_or(f64::NAN, |slot| Number::of(&signals[index], slot).real())
     };
     let mut all: Vec<Points> = indices.iter().map(|_| Points::new(known, most)).collect();
-    // Forced values take the places of others, so that all changes of these signals are needed first.
+    // Forced values take the places of the own ones, so that all changes of these signals are needed first.
     let mut own: BTreeMap<usize, Vec<TrendPoint>> = (0..indices.len())
         .filter(|place| archive.has_forces(indices[*place]))
         .map(|place| (place, Vec::new()))

@@ -208,7 +208,7 @@ fn a_moment_has_the_line_and_the_events_before_it() {
     let all = "opening running fault failed";
     assert_eq!(kinds(20), Some((all.to_owned(), true, 5.0)));
     assert_eq!(archive.fault_events(Nanos::ZERO)[0].ago_ms, 8);
-    // The simulation has not ticked since then, and the time goes on.
+    // The simulation has not ticked since then, and the time continues.
     let later = archive.fault_events(Nanos::from_millis(1_500));
     assert_eq!(later[0].ago_ms, 1_508);
 }

@@ -10,7 +10,7 @@ use tickbus_base::percent_decoded;
 use tokio::time::{Interval, interval, sleep};
 
 use crate::feed::Viewer;
-use crate::serve::Hall;
+use crate::feeds::Feeds;
 
 /// A viewer gets a message of each page at least this often while the page's site answers; a page without messages knows
 /// that its contents are outdated.
@@ -58,24 +58,24 @@ pub(crate) fn of_page(viewer: Viewer) -> impl Stream<Item = Sent> + use<> {
 }
 
 /// The newest states of several pages, each marked with the path of its page, and the tabs of the room. A page that is not there, or leaves, is waited for.
-pub(crate) fn of_pages(hall: &Arc<Hall>, pages: Vec<String>) -> impl Stream<Item = Sent> + use<> {
-    let pages = pages.into_iter().map(|path| marked(hall, path));
-    let all: Vec<_> = std::iter::once(tabs(hall)).chain(pages).collect();
+pub(crate) fn of_pages(feeds: &Arc<Feeds>, pages: Vec<String>) -> impl Stream<Item = Sent> + use<> {
+    let pages = pages.into_iter().map(|path| marked(feeds, path));
+    let all: Vec<_> = std::iter::once(tabs(feeds)).chain(pages).collect();
     select_all(all).flat_map(|parts| iter(parts.map(|part| Ok(Frame::data(part)))))
 }
 
 /// The events of a page, in two parts: its mark, and the event, which all viewers share.
-fn marked(hall: &Arc<Hall>, path: String) -> BoxStream<'static, [Bytes; 2]> {
+fn marked(feeds: &Arc<Feeds>, path: String) -> BoxStream<'static, [Bytes; 2]> {
     let mark = Bytes::from(format!("event: {path}\n"));
     let beat = Bytes::from(format!("data: {path}\n\n"));
-    let hall = Arc::clone(hall);
+    let feeds = Arc::clone(feeds);
     unfold(None::<Events>, move |mut events| {
-        let (hall, path, mark, beat) =
-            (Arc::clone(&hall), path.clone(), mark.clone(), beat.clone());
+        let (feeds, path, mark, beat) =
+            (Arc::clone(&feeds), path.clone(), mark.clone(), beat.clone());
         async move {
             loop {
                 let Some(present) = &mut events else {
-                    events = hall.feeds.subscribe(&path).map(Events::new);
+                    events = feeds.subscribe(&path).map(Events::new);
                     if events.is_none() {
                         sleep(BEAT).await;
                     }
@@ -99,15 +99,15 @@ fn marked(hall: &Arc<Hall>, path: String) -> BoxStream<'static, [Bytes; 2]> {
 
 /// The tabs of the room, at first and whenever they have changed; otherwise a beat of the room itself, so that the browser
 /// knows that it is connected.
-fn tabs(hall: &Arc<Hall>) -> BoxStream<'static, [Bytes; 2]> {
-    let hall = Arc::clone(hall);
+fn tabs(feeds: &Arc<Feeds>) -> BoxStream<'static, [Bytes; 2]> {
+    let feeds = Arc::clone(feeds);
     unfold(None::<String>, move |told| {
-        let hall = Arc::clone(&hall);
+        let feeds = Arc::clone(&feeds);
         async move {
             if told.is_some() {
                 sleep(BEAT).await;
             }
-            let tabs = hall.pages.tabs().to_string();
+            let tabs = feeds.tabs();
             let event = if told.as_ref() == Some(&tabs) {
                 [
                     Bytes::from_static(b"event: beat\n"),

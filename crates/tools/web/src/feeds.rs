@@ -29,6 +29,11 @@ impl Feeds {
         self.by_path.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// The tabs of the room, as JSON.
+    pub(crate) fn tabs(&self) -> String {
+        self.pages.tabs().to_string()
+    }
+
     /// Adds a viewer of the page at this path; `None` if there is no such page. Called on the room's runtime.
     pub(crate) fn subscribe(self: &Arc<Self>, path: &str) -> Option<Viewer> {
         let site = self.pages.page_at(path)?;

@@ -157,7 +157,7 @@ async fn get(
     let holder = || (token == Token::Right).then(|| Holder::new(hall));
     if let Some(query) = query.filter(|_| path == "/events") {
         let pages = events::asked(query).map_err(|text| (StatusCode::BAD_REQUEST, text))?;
-        return Ok(stream(events::of_pages(hall, pages), holder()));
+        return Ok(stream(events::of_pages(&hall.feeds, pages), holder()));
     }
     // The state of the page at what is before the end of the path.
     let viewer = |end: &str| {

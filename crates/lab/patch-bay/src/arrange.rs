@@ -55,16 +55,18 @@ pub(crate) fn arrange(sizes: &[Size], links: &[(usize, usize)]) -> Vec<Spot> {
     spots
 }
 
+/// The first box of the part that a box belongs to.
+fn root(of: &mut [usize], mut at: usize) -> usize {
+    while of[at] != at {
+        of[at] = of[of[at]];
+        at = of[at];
+    }
+    at
+}
+
 /// The connected parts: those with links in the order of their first boxes, then the single boxes.
 fn parts(count: usize, links: &[(usize, usize)]) -> Vec<Vec<usize>> {
     let mut of: Vec<usize> = (0..count).collect();
-    fn root(of: &mut [usize], mut at: usize) -> usize {
-        while of[at] != at {
-            of[at] = of[of[at]];
-            at = of[at];
-        }
-        at
-    }
     for (from, to) in links {
         let (one, other) = (root(&mut of, *from), root(&mut of, *to));
         of[one.max(other)] = one.min(other);

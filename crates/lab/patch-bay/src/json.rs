@@ -3,12 +3,23 @@
 use std::fmt::{self, Display, Write as _};
 
 use tickbus_dispatcher::{ChannelState, ClientState, Label, Number, Pin};
+use tickbus_web::Differences;
 
-use crate::layout::Place;
-use crate::model::{Cable, Gone, Model, Shown};
+use crate::model::{Cable, Gone, Model, Shared, Shown};
+use crate::place::Place;
+
+impl Differences for Shared {
+    fn number(&self) -> u64 {
+        self.with(|model| model.number)
+    }
+
+    fn since(&self, seen: Option<u64>) -> (u64, String) {
+        self.with(|model| (model.number, state(model, model.seen(seen))))
+    }
+}
 
 /// The board in one line; with `seen`, what has changed since the state with this number.
-pub(crate) fn state(model: &Model, seen: Option<u64>) -> String {
+fn state(model: &Model, seen: Option<u64>) -> String {
     let mut json = String::new();
     // Writing to a String cannot fail.
     let _ = match seen {

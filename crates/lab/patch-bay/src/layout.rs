@@ -5,10 +5,11 @@ use std::fmt::Write as _;
 
 use serde_json::Value;
 use tickbus_base::time::Nanos;
-use tickbus_dispatcher::{Channel, ClientState, Label, Pin};
+use tickbus_dispatcher::{Channel, ClientState, Label};
 
 use crate::arrange::{Placed, ROW, Size, Spot, arrange, beside, under};
 use crate::layout_file::LayoutFile;
+use crate::place::{FARTHEST, Place};
 
 /// For this long a client that has come is placed again when its connections change: it states them after its name.
 const SETTLING: Nanos = Nanos(2_000_000_000);
@@ -19,9 +20,8 @@ const OPEN: usize = 24;
 /// More new boxes than this are arranged among themselves, below the others.
 const MANY: usize = 50;
 
-/// The most places that are kept, and the largest coordinate.
+/// The most places that are kept.
 const MOST: usize = 20_000;
-pub(crate) const FARTHEST: i32 = 1_000_000;
 
 /// The sizes of a box, in pixels; page.css has the same.
 const WIDTH: i32 = 208;
@@ -76,30 +76,6 @@ impl BoxShape {
         Size {
             width,
             height: HEADER + open,
-        }
-    }
-}
-
-/// The place of a box.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Place {
-    pub(crate) spot: Spot,
-    pub(crate) is_folded: bool,
-    pub(crate) group: Option<Label>,
-    /// The state in which it last changed.
-    pub(crate) changed: u64,
-    /// Until when the box may be placed again.
-    settles: Option<Nanos>,
-}
-
-impl Place {
-    pub(crate) const fn kept(spot: Spot, is_folded: bool, group: Option<Label>) -> Self {
-        Self {
-            spot,
-            is_folded,
-            group,
-            changed: 0,
-            settles: None,
         }
     }
 }
@@ -353,14 +329,10 @@ fn coordinate(value: &Value) -> Result<i32, &'static str> {
     number.ok_or("write a whole number of pixels from 0 to 1000000")
 }
 
-/// True if a box can have this name.
-pub(crate) fn is_box(name: &str) -> bool {
-    Pin::parse(&format!("{name}:Q1")).is_some()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::layout_file;
 
     fn shape(name: &str) -> BoxShape {
         BoxShape::absent(name)
@@ -435,5 +407,31 @@ mod tests {
             assert!(refused.contains(part), "{refused}");
             assert_eq!(layout.places, before, "{body}");
         }
+    }
+
+    #[test]
+    fn a_layout_reads_what_was_written() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("patch.layout.toml");
+        assert!(layout_file::load(&path).expect("no file").is_empty());
+        let text = format!(
+            "{}\"A.1\" = {{ x = 3, y = 1000000 }}\n\
+             \"P@hall\" = {{ x = 0, y = 7, folded = true, group = \"Hall \\\"1\\\" \\\\ ä\" }}\n",
+            layout_file::HEADING
+        );
+        std::fs::write(&path, &text).expect("it can be written");
+        let places = layout_file::load(&path).expect("it is right");
+        assert_eq!(
+            places["P@hall"].group.as_ref().map(Label::as_str),
+            Some("Hall \"1\" \\ ä")
+        );
+        let file = LayoutFile::start(path.clone(), |told| panic!("{told}")).expect("a thread");
+        std::fs::remove_file(&path).expect("it is there");
+        let mut layout = Layout::new(places, file);
+        layout.change(r#"{"A.1":{"x":4}}"#, 1).expect("right");
+        layout.change(r#"{"A.1":{"x":3}}"#, 2).expect("right");
+        // Ends the thread, which saves first.
+        drop(layout);
+        assert_eq!(std::fs::read_to_string(&path).expect("it is saved"), text);
     }
 }

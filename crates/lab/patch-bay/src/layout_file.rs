@@ -11,7 +11,7 @@ use tickbus_base::toml_text::{Collector, Mistakes, Table, load_text, read_text};
 use tickbus_dispatcher::{LONGEST_LABEL, Label, replace_file};
 
 use crate::arrange::Spot;
-use crate::layout::{FARTHEST, Place, is_box};
+use crate::place::{FARTHEST, Place, is_box};
 
 pub(crate) const HEADING: &str = "\
 # Where the patch bay shows the clients, in pixels. It is rewritten when a box is moved: edit it only while the dispatcher
@@ -140,32 +140,6 @@ fn read(table: &Table<'_>) -> BTreeMap<String, Place> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::layout::Layout;
-
-    #[test]
-    fn a_layout_reads_what_was_written() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let path = folder.path().join("patch.layout.toml");
-        assert!(load(&path).expect("no file").is_empty());
-        let text = format!(
-            "{HEADING}\"A.1\" = {{ x = 3, y = 1000000 }}\n\
-             \"P@hall\" = {{ x = 0, y = 7, folded = true, group = \"Hall \\\"1\\\" \\\\ ä\" }}\n"
-        );
-        fs::write(&path, &text).expect("it can be written");
-        let places = load(&path).expect("it is right");
-        assert_eq!(
-            places["P@hall"].group.as_ref().map(Label::as_str),
-            Some("Hall \"1\" \\ ä")
-        );
-        let file = LayoutFile::start(path.clone(), |told| panic!("{told}")).expect("a thread");
-        fs::remove_file(&path).expect("it is there");
-        let mut layout = Layout::new(places, file);
-        layout.change(r#"{"A.1":{"x":4}}"#, 1).expect("right");
-        layout.change(r#"{"A.1":{"x":3}}"#, 2).expect("right");
-        // Ends the thread, which saves first.
-        drop(layout);
-        assert_eq!(fs::read_to_string(&path).expect("it is saved"), text);
-    }
 
     #[test]
     fn mistakes_are_told_at_their_place() {

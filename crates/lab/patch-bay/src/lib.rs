@@ -7,6 +7,7 @@ mod json;
 mod layout;
 mod layout_file;
 mod model;
+mod place;
 
 use std::io;
 use std::path::{Path, PathBuf};

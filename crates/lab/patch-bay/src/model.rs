@@ -5,9 +5,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tickbus_base::time::Nanos;
 use tickbus_dispatcher::{ClientState, Connection, Pin, Snapshot};
-use tickbus_web::Differences;
 
-use crate::json;
 use crate::layout::{BoxShape, Layout};
 
 /// The number of clients and cables that are remembered after they have gone, for viewers who do not know it yet.
@@ -208,9 +206,9 @@ impl Model {
         (boxes, links)
     }
 
-    fn since(&self, seen: Option<u64>) -> String {
-        let seen = seen.filter(|seen| *seen >= self.floor);
-        json::state(self, seen)
+    /// The state that a viewer has seen, if what has gone since then is still known.
+    pub(crate) fn seen(&self, seen: Option<u64>) -> Option<u64> {
+        seen.filter(|seen| *seen >= self.floor)
     }
 }
 
@@ -255,14 +253,4 @@ impl Shared {
 /// After a panic the next picture updates every client anyway.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-impl Differences for Shared {
-    fn number(&self) -> u64 {
-        self.with(|model| model.number)
-    }
-
-    fn since(&self, seen: Option<u64>) -> (u64, String) {
-        self.with(|model| (model.number, model.since(seen)))
-    }
 }

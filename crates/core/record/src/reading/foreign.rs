@@ -100,7 +100,7 @@ impl<R: BufRead> ForeignReader<R> {
                 }
                 "var" => {
                     if let Some(column) = self.variable(&words, &scopes, columns.columns.len())? {
-                        let name = unique(column.name, &mut names);
+                        let name = unique(&column.name, &mut names);
                         columns.columns.push(Column { name, ..column });
                     }
                     if columns.columns.len() > MOST_COLUMNS {
@@ -345,10 +345,10 @@ fn unit(text: &str) -> Result<i128, ReadError> {
 }
 
 /// The name, or with a number if it is taken. `names` has how often each was given.
-fn unique(name: String, names: &mut HashMap<String, usize>) -> String {
-    let mut own = name.clone();
+fn unique(name: &str, names: &mut HashMap<String, usize>) -> String {
+    let mut own = name.to_owned();
     while names.contains_key(&own) {
-        let given = names.entry(name.clone()).or_insert(1);
+        let given = names.entry(name.to_owned()).or_insert(1);
         *given += 1;
         own = format!("{name} ({given})");
     }
@@ -419,14 +419,18 @@ mod tests {
         #250 0! bZ0 \" sbusy % r-2e3 $\n$comment words 1! $end\n#300\n\
         b1111111111111111111111111111111111111111 '\nU!\n#1000000";
 
-    fn open(
-        text: &'static str,
-    ) -> Result<(ForeignReader<&'static [u8]>, Columns), (ReadError, u64)> {
+    /// A mistake, and its line.
+    type Placed = (ReadError, u64);
+
+    /// Number, time in nanoseconds and values.
+    type Seen = (u64, i64, Vec<f64>);
+
+    fn open(text: &'static str) -> Result<(ForeignReader<&'static [u8]>, Columns), Placed> {
         ForeignReader::open(text.as_bytes())
     }
 
-    /// The ticks of a file: number, time in nanoseconds and values.
-    fn ticks(text: &'static str) -> Result<Vec<(u64, i64, Vec<f64>)>, (ReadError, u64)> {
+    /// The ticks of a file.
+    fn ticks(text: &'static str) -> Result<Vec<Seen>, Placed> {
         let (mut reader, columns) = open(text)?;
         let mut tick = Tick::new(&columns);
         let mut all = Vec::new();

@@ -274,10 +274,10 @@ def petri_page(browser, album, _work):
     with Program("tools/demo-cell", "--page", "127.0.0.1:0", BUILT="yes") as program:
         browser.look(1470, 850)
         browser.go(program.after("nets: live at "))
-        section = "[...document.querySelectorAll('#nets > *')].find((it) => it.querySelector('h2')?.textContent.startsWith('transport'))"
-        browser.wait(section)
+        transport = "[...document.querySelectorAll('#choice button')].find((it) => it.textContent.startsWith('transport'))"
+        browser.wait(transport)
         time.sleep(20)
-        browser.run(f"document.getElementById('fit').click(); {section}.scrollIntoView({{ block: 'start', behavior: 'instant' }})")
+        browser.run(f"{transport}.click()")
         time.sleep(1)
         album.add("petri-page", browser.shoot())
 

@@ -1,6 +1,9 @@
 //! Petri nets on the page of this process.
 
-#![allow(unsafe_code, reason = "exported names and the pointers that a caller in C hands in")]
+#![allow(
+    unsafe_code,
+    reason = "exported names and the pointers that a caller in C hands in"
+)]
 
 use std::ffi::c_char;
 

@@ -51,7 +51,9 @@ extern "system" fn Java_tickbus_LiveNets_drawNative<'local>(
     handle: jlong,
     json: JString<'local>,
 ) {
-    answer(env, |env| Ok(nets::draw(handle, &json.try_to_string(env)?)?));
+    answer(env, |env| {
+        Ok(nets::draw(handle, &json.try_to_string(env)?)?)
+    });
 }
 
 /// `static native boolean wantedNative(long handle, long nanos)`

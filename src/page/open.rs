@@ -151,7 +151,9 @@ impl Open {
 
     /// The address without the token.
     fn plain_url(&self) -> &str {
-        self.url.split_once('#').map_or(&self.url, |(plain, _)| plain)
+        self.url
+            .split_once('#')
+            .map_or(&self.url, |(plain, _)| plain)
     }
 
     /// Opens the studio of a driver.
@@ -267,7 +269,11 @@ impl NetsPlace {
         self.nets.leave();
         // Locked so that nobody asks for the address while it is being released.
         let present = present();
-        let held = self.held.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let held = self
+            .held
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .take();
         drop(held);
         drop(present);
     }

@@ -8,13 +8,34 @@ use crate::layout::Net;
 const SVG: &str = "http://www.w3.org/2000/svg";
 
 const ELEMENTS: &[&str] = &[
-    "svg", "g", "title", "path", "line", "polyline", "polygon", "rect", "circle", "ellipse", "text",
-    "tspan",
+    "svg", "g", "title", "path", "line", "polyline", "polygon", "rect", "circle", "ellipse",
+    "text", "tspan",
 ];
 
 const ATTRIBUTES: &[&str] = &[
-    "class", "role", "aria-label", "width", "height", "viewBox", "transform", "d", "points", "x", "y",
-    "x1", "y1", "x2", "y2", "cx", "cy", "r", "rx", "ry", "text-anchor", "data-place", "data-transition",
+    "class",
+    "role",
+    "aria-label",
+    "width",
+    "height",
+    "viewBox",
+    "transform",
+    "d",
+    "points",
+    "x",
+    "y",
+    "x1",
+    "y1",
+    "x2",
+    "y2",
+    "cx",
+    "cy",
+    "r",
+    "rx",
+    "ry",
+    "text-anchor",
+    "data-place",
+    "data-transition",
 ];
 
 /// Says what is wrong with the drawing of a net.

@@ -96,7 +96,11 @@ impl NetState {
                 return Err(format!("has {count} \"{what}\"; expected {expected}"));
             }
         }
-        if !self.phases.bytes().all(|phase| (b'0'..=b'3').contains(&phase)) {
+        if !self
+            .phases
+            .bytes()
+            .all(|phase| (b'0'..=b'3').contains(&phase))
+        {
             return Err("has other phases than 0, 1, 2 and 3".to_owned());
         }
         for (what, greatest, count) in [

@@ -79,7 +79,8 @@ fn viewers_get_the_newest_state_and_none_from_before_they_came() {
     );
     nets.draw(&layout(SVG)).expect("a drawing");
     // A line end in an event would break it.
-    nets.put(&format!("\n{:#}\n", json!({ "nets": [state()] }))).expect("a state");
+    nets.put(&format!("\n{:#}\n", json!({ "nets": [state()] })))
+        .expect("a state");
     let json = Hall::look(&page.0)();
     assert!(!json.contains('\n'), "{json}");
     let seen = page.seen();
@@ -100,11 +101,19 @@ fn programs_come_and_go_and_each_has_its_own_layout() {
     assert!(page.0.layout(1).is_none() && page.0.layout(2).is_some());
     drop(one);
     let three = page.join("Three");
-    let ids: Vec<Json> = page.seen()["sets"].as_array().expect("sets").iter().map(|set| set["id"].clone()).collect();
+    let ids: Vec<Json> = page.seen()["sets"]
+        .as_array()
+        .expect("sets")
+        .iter()
+        .map(|set| set["id"].clone())
+        .collect();
     assert_eq!(ids, [2, 3], "no number is given twice");
     two.leave();
     assert_eq!(two.wanted(Nanos::from_secs(60)), Wanted::Over);
-    assert!(two.put(&states(&state())).is_err_and(|why| why.contains("open them again")));
+    assert!(
+        two.put(&states(&state()))
+            .is_err_and(|why| why.contains("open them again"))
+    );
     drop(three);
     assert_eq!(page.seen()["sets"], json!([]));
 }
@@ -135,23 +144,62 @@ fn only_shapes_and_texts_are_drawings() {
     let (page, _) = page();
     let inside = |text: &str| SVG.replace("<title>", &format!("{text}<title>"));
     for (svg, what) in [
-        (inside("<script>alert(1)</script>"), "has the element <script>"),
-        (inside("<style>body{display:none}</style>"), "has the element <style>"),
-        (inside("<foreignObject/>"), "has the element <foreignObject>"),
-        (inside("<image href=\"http://evil.example\"/>"), "has the element <image>"),
-        (inside("<p xmlns=\"http://www.w3.org/1999/xhtml\"/>"), "has the element <p>"),
-        (inside("<rect xmlns=\"http://www.w3.org/1999/xhtml\"/>"), "has the element <rect>"),
-        (inside("<rect onclick=\"alert(1)\"/>"), "has the attribute onclick of <rect>"),
-        (inside("<rect style=\"position:fixed\"/>"), "has the attribute style of <rect>"),
-        (inside("<rect id=\"link\"/>"), "has the attribute id of <rect>"),
-        (SVG.replace("data-place=\"0\"", "data-place=\"1\""), "data-place=\"1\"; expected a number below 1"),
-        (SVG.replace("data-place=\"0\"", "data-transition=\"-1\""), "data-transition=\"-1\""),
+        (
+            inside("<script>alert(1)</script>"),
+            "has the element <script>",
+        ),
+        (
+            inside("<style>body{display:none}</style>"),
+            "has the element <style>",
+        ),
+        (
+            inside("<foreignObject/>"),
+            "has the element <foreignObject>",
+        ),
+        (
+            inside("<image href=\"http://evil.example\"/>"),
+            "has the element <image>",
+        ),
+        (
+            inside("<p xmlns=\"http://www.w3.org/1999/xhtml\"/>"),
+            "has the element <p>",
+        ),
+        (
+            inside("<rect xmlns=\"http://www.w3.org/1999/xhtml\"/>"),
+            "has the element <rect>",
+        ),
+        (
+            inside("<rect onclick=\"alert(1)\"/>"),
+            "has the attribute onclick of <rect>",
+        ),
+        (
+            inside("<rect style=\"position:fixed\"/>"),
+            "has the attribute style of <rect>",
+        ),
+        (
+            inside("<rect id=\"link\"/>"),
+            "has the attribute id of <rect>",
+        ),
+        (
+            SVG.replace("data-place=\"0\"", "data-place=\"1\""),
+            "data-place=\"1\"; expected a number below 1",
+        ),
+        (
+            SVG.replace("data-place=\"0\"", "data-transition=\"-1\""),
+            "data-transition=\"-1\"",
+        ),
         (SVG.replace("</svg>", ""), "is not SVG"),
-        (format!("<!DOCTYPE svg [<!ENTITY a \"b\">]>{SVG}"), "is not SVG"),
+        (
+            format!("<!DOCTYPE svg [<!ENTITY a \"b\">]>{SVG}"),
+            "is not SVG",
+        ),
         ("<p/>".to_owned(), "begins with <p>; expected <svg>"),
     ] {
         let why = page.join("t").draw(&layout(&svg)).expect_err(&svg);
-        assert!(why.contains("\"press <1>\"") && why.contains(what), "{svg}: {why}");
+        assert!(
+            why.contains("\"press <1>\"") && why.contains(what),
+            "{svg}: {why}"
+        );
     }
 }
 
@@ -165,14 +213,23 @@ fn json_that_does_not_fit_is_refused_and_says_where() {
     };
     refused(nets.put(&states(&state())), "not drawn yet");
     refused(nets.draw("{\"nets\":[{]}"), "column 11");
-    refused(nets.draw("{\"nets\":[],\"evil\":1}"), "unknown field `evil`");
-    refused(nets.draw(&" ".repeat(33 << 20)), "bytes, and the most is 33554432");
+    refused(
+        nets.draw("{\"nets\":[],\"evil\":1}"),
+        "unknown field `evil`",
+    );
+    refused(
+        nets.draw(&" ".repeat(33 << 20)),
+        "bytes, and the most is 33554432",
+    );
     let nets = page.join("The press");
     nets.draw(&layout(SVG)).expect("a drawing");
     refused(nets.draw(&layout(SVG)), "drawn already");
     refused(nets.put("{\"nets\":[]}"), "there are 0; expected 1");
     refused(nets.put("[]"), "docs/petri.md");
-    refused(nets.put(&"[".repeat(5 << 20)), "bytes, and the most is 4194304");
+    refused(
+        nets.put(&"[".repeat(5 << 20)),
+        "bytes, and the most is 4194304",
+    );
     for (key, value, what) in [
         ("tokens", json!([1, 2]), "has 2 \"tokens\"; expected 1"),
         ("tokens", json!([-1]), "invalid value"),
@@ -190,7 +247,8 @@ fn json_that_does_not_fit_is_refused_and_says_where() {
         state[key] = value;
         refused(nets.put(&states(&state)), what);
     }
-    nets.put("{\"nets\":[null]}").expect("a net that was not scanned");
+    nets.put("{\"nets\":[null]}")
+        .expect("a net that was not scanned");
 }
 
 #[test]

@@ -3,8 +3,6 @@
 
 use roxmltree::{Document, Node};
 
-use crate::layout::Net;
-
 const SVG: &str = "http://www.w3.org/2000/svg";
 
 const ELEMENTS: &[&str] = &[
@@ -38,9 +36,9 @@ const ATTRIBUTES: &[&str] = &[
     "data-transition",
 ];
 
-/// Says what is wrong with the drawing of a net.
-pub(crate) fn check(net: &Net) -> Result<(), String> {
-    let drawing = Document::parse(&net.svg).map_err(|why| format!("is not SVG: {why}"))?;
+/// Says what is wrong with the drawing of a net of so many places and transitions.
+pub(crate) fn check(svg: &str, places: usize, transitions: usize) -> Result<(), String> {
+    let drawing = Document::parse(svg).map_err(|why| format!("is not SVG: {why}"))?;
     let root = drawing.root_element();
     if root.tag_name().name() != "svg" {
         return Err(format!(
@@ -49,12 +47,12 @@ pub(crate) fn check(net: &Net) -> Result<(), String> {
         ));
     }
     for node in root.descendants().filter(Node::is_element) {
-        element(node, net)?;
+        element(node, places, transitions)?;
     }
     Ok(())
 }
 
-fn element(node: Node<'_, '_>, net: &Net) -> Result<(), String> {
+fn element(node: Node<'_, '_>, places: usize, transitions: usize) -> Result<(), String> {
     let name = node.tag_name().name();
     if node.tag_name().namespace() != Some(SVG) || !ELEMENTS.contains(&name) {
         let expected = ELEMENTS.join(", ");
@@ -68,8 +66,8 @@ fn element(node: Node<'_, '_>, net: &Net) -> Result<(), String> {
             ));
         }
         let count = match key {
-            "data-place" => net.places.len(),
-            "data-transition" => net.transitions.len(),
+            "data-place" => places,
+            "data-transition" => transitions,
             _ => continue,
         };
         let value = attribute.value();

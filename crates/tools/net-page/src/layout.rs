@@ -75,7 +75,7 @@ pub(crate) fn read(json: &str) -> Result<Layout, String> {
         )));
     }
     for net in &layout.nets {
-        drawing::check(net)
+        drawing::check(&net.svg, net.places.len(), net.transitions.len())
             .map_err(|what| wrong(format!("the drawing of \"{}\" {what}", net.name)))?;
     }
     Ok(layout)

@@ -11,7 +11,7 @@ use tickbus_base::time::{Clock, Nanos};
 use tickbus_web::Site;
 
 use crate::layout::{self, Layout};
-use crate::{site, state};
+use crate::state;
 
 /// The shortest time between two states of a program that are wanted.
 const PERIOD: Nanos = Nanos::from_millis(33);
@@ -89,7 +89,7 @@ impl NetPage {
 
     /// The page for the room.
     pub fn site(&self) -> Arc<dyn Site> {
-        Arc::new(site::NetSite(Arc::clone(&self.0)))
+        Arc::new(self.clone())
     }
 
     /// Adds the nets of a program, under a heading.

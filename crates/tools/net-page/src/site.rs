@@ -1,16 +1,12 @@
 //! The page as a site of the room.
 
-use std::sync::Arc;
-
 use tickbus_web::{Answer, Asset, Change, Document, Outcome, Refused, Site, State};
 
 use crate::assets::ASSETS;
-use crate::page::Hall;
+use crate::page::NetPage;
 
-/// The page of nets. It only shows.
-pub(crate) struct NetSite(pub(crate) Arc<Hall>);
-
-impl Site for NetSite {
+/// The page only shows.
+impl Site for NetPage {
     fn assets(&self) -> &[Asset] {
         ASSETS
     }

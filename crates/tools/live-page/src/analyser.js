@@ -142,8 +142,10 @@ const analyser = (() => {
 
   /** Shares the height of the window among the signals, in the view that has nothing else. */
   function fit() {
+    // On a phone the whole analyser scrolls, with rows of one height.
+    const isAlone = views.now === "recording" && !views.isPhone;
     const free = (get("axis").clientHeight - AXIS) / tracks.length;
-    row = views.now === "recording" ? Math.round(Math.min(HIGHEST, Math.max(ROW, free))) : ROW;
+    row = isAlone ? Math.round(Math.min(HIGHEST, Math.max(ROW, free))) : ROW;
     for (const item of get("tracks").children) item.style.height = `${row}px`;
     changed();
   }

@@ -10,7 +10,7 @@ mod open;
 #[cfg(not(feature = "page"))]
 pub(crate) use none::{show, show_run};
 #[cfg(feature = "page")]
-pub(crate) use open::{options, picture_at, show, show_recording, show_run};
+pub(crate) use open::{lists_beside, options, picture_at, show, show_recording, show_run};
 
 #[cfg(all(feature = "doors", not(feature = "page")))]
 pub(crate) use none::{NetsPlace, show_nets};

@@ -119,6 +119,9 @@ mod served {
         if let Some(why) = recorded.broken() {
             eprintln!("show: {why}");
         }
+        if let Some(config) = &config {
+            recorded.set_lists(page::lists_beside(&config.path));
+        }
         let names = recorded.names();
         if let (Some(config), Some(table)) = (&config, table)
             && !names.iter().any(|name| table.position(name).is_some())

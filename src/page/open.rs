@@ -1,7 +1,7 @@
 //! The pages that are served: opened for the first driver, or the first nets, that ask for one, and closed with the last.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
 use tickbus_base::time::Monotonic;
@@ -191,7 +191,13 @@ pub(crate) fn options(config: &Config) -> Result<Options, PageError> {
     Ok(Options {
         grace: wanted.grace,
         picture,
+        lists: Some(lists_beside(&config.path)),
     })
+}
+
+/// The file of the lists of signals: `tank.lists.toml` beside `tank.cfg`.
+pub(crate) fn lists_beside(config: &Path) -> PathBuf {
+    config.with_extension("lists.toml")
 }
 
 /// Shows a run on virtual time on the page, which is served at `listen` unless there is one already.

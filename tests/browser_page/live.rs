@@ -2,6 +2,7 @@
 
 mod analyser;
 mod large;
+mod lists;
 mod outage;
 mod past;
 mod phone;

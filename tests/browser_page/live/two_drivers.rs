@@ -35,6 +35,7 @@ impl Ticking {
         let options = Options {
             grace: None,
             picture: None,
+            lists: None,
         };
         let member = page.join(driver.watch(), options);
         let stop = Arc::new(Stop::new());

@@ -50,4 +50,4 @@ pub use supervise::panic_text;
 pub use tick::Exchange;
 pub use tick_counters::TickCounters;
 pub use view::{StationView, View};
-pub use watch::Watch;
+pub use watch::{Force, Watch};

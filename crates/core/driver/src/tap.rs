@@ -33,6 +33,23 @@ const ORDERS_LIMIT: usize = 256;
 enum Order {
     Inject(Prepared),
     End(u32),
+    Batch(Box<Batch>),
+}
+
+/// Faults that begin in the same tick, in place of others that end in it.
+#[derive(Debug)]
+struct Batch {
+    begin: Vec<Prepared>,
+    end: Vec<u32>,
+    /// Those that the new ones replace on the list, with room for all.
+    retired: Vec<Retired>,
+}
+
+/// Memory that only the other thread can free.
+#[derive(Debug)]
+enum Waste {
+    Fault(#[expect(dead_code, reason = "kept for its drop")] Retired),
+    Batch(#[expect(dead_code, reason = "kept for its drop")] Box<Batch>),
 }
 
 /// The requests to a tick.
@@ -60,7 +77,7 @@ pub(super) struct Tap {
     views: Writer<View>,
     orders: Receiver<Order>,
     /// The way back for memory that only the other thread can free.
-    retired: SyncSender<Retired>,
+    retired: SyncSender<Waste>,
 }
 
 /// The other end.
@@ -69,7 +86,7 @@ pub(super) struct Handle {
     wanted: Arc<AtomicU8>,
     views: Reader<View>,
     orders: SyncSender<Order>,
-    retired: Receiver<Retired>,
+    retired: Receiver<Waste>,
 }
 
 /// Creates both ends; `initial` is visible before the first tick.
@@ -77,7 +94,7 @@ pub(super) fn tap(initial: &View) -> (Tap, Handle) {
     let wanted = Arc::<AtomicU8>::default();
     let (writer, reader) = triple_buffer(initial);
     let (send, orders) = sync_channel(ORDERS_LIMIT);
-    // An order retires at most one fault, and the sender of orders empties this queue first.
+    // An order retires at most one fault or one batch, and the sender of orders empties this queue first.
     let (retired, take) = sync_channel(2 * ORDERS_LIMIT);
     let tap = Tap {
         wanted: Arc::clone(&wanted),
@@ -120,10 +137,23 @@ impl Tap {
                 Ok(Order::Inject(prepared)) => {
                     if let Some(retired) = faults.adopt(prepared) {
                         // There is room, see above; without room the fault is freed here.
-                        let _ = self.retired.try_send(retired);
+                        let _ = self.retired.try_send(Waste::Fault(retired));
                     }
                 }
                 Ok(Order::End(id)) => drop(faults.end(id)),
+                Ok(Order::Batch(mut batch)) => {
+                    let Batch {
+                        begin,
+                        end,
+                        retired,
+                    } = &mut *batch;
+                    retired.extend(begin.drain(..).filter_map(|fault| faults.adopt(fault)));
+                    for id in end {
+                        faults.end(*id);
+                    }
+                    // As above.
+                    let _ = self.retired.try_send(Waste::Batch(batch));
+                }
                 Err(TryRecvError::Empty | TryRecvError::Disconnected) => return,
             }
         }
@@ -154,6 +184,22 @@ impl Handle {
             }
             why
         })
+    }
+
+    /// Lets faults begin in the same tick, and others end in it.
+    pub(super) fn replace(&self, begin: Vec<Prepared>, end: Vec<u32>) -> Result<(), Mistake> {
+        let batch = Batch {
+            retired: Vec::with_capacity(begin.len()),
+            begin,
+            end,
+        };
+        self.order(Order::Batch(Box::new(batch)))
+            .map_err(|(order, why)| {
+                if let Order::Batch(batch) = order {
+                    batch.begin.into_iter().for_each(Prepared::cancel);
+                }
+                why
+            })
     }
 
     /// Lets the next tick end a fault.

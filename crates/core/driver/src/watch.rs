@@ -19,6 +19,17 @@ use super::tap::{Handle, Tap, tap};
 use super::tick_counters::TickTimes;
 use super::view::View;
 
+/// How a signal is forced.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Force {
+    /// The index of the signal.
+    pub signal: usize,
+    /// The change of its value.
+    pub effect: SignalEffect,
+    /// When it ends without a request.
+    pub lasts: Lasts,
+}
+
 /// Looks at a driver or a hosted program from another thread, and forces its signals. Neither thread waits for the
 /// other.
 ///
@@ -217,6 +228,43 @@ impl Watch {
         self.inject(name, effect)
     }
 
+    /// Changes signals by faults called `forced: <the signal's name>`, all from the same tick on, and ends the faults
+    /// with the numbers `end` in that tick. The driver reads the order at the end of the next tick, so the tick after
+    /// that is the first that shows the values. Returns the numbers of the new faults.
+    ///
+    /// # Errors
+    ///
+    /// Too many faults are waiting or active, or the simulation no longer takes orders; then nothing is changed.
+    ///
+    /// # Panics
+    ///
+    /// When there is no such signal.
+    pub fn force_all(&mut self, forces: &[Force], end: Vec<u32>) -> Result<Vec<u32>, Mistake> {
+        let mut begin: Vec<Prepared> = Vec::with_capacity(forces.len());
+        for force in forces {
+            let name = format!("forced: {}", self.config.table.signals[force.signal].name);
+            match self.prepared(
+                name,
+                Effect::Signal(force.signal, force.effect),
+                force.lasts,
+            ) {
+                Ok(fault) => begin.push(fault),
+                Err(why) => {
+                    begin.into_iter().for_each(Prepared::cancel);
+                    return Err(why);
+                }
+            }
+        }
+        let ids = begin.iter().map(Prepared::id).collect();
+        self.handle.replace(begin, end)?;
+        Ok(ids)
+    }
+
+    /// Returns the value that a ramp has reached, by the number of its fault; `None` before it begins.
+    pub fn ramp_value(&self, fault: u32) -> Option<Slot> {
+        self.figures.board.ramp_value(fault)
+    }
+
     /// Returns the faults that the simulation's model has declared, in its order.
     pub fn model_faults(&self) -> Arc<[String]> {
         self.figures.board.model_faults()
@@ -234,12 +282,19 @@ impl Watch {
     }
 
     fn inject(&mut self, name: String, effect: Effect) -> Result<u32, Mistake> {
+        let prepared = self.prepared(name, effect, Lasts::UntilEnded)?;
+        let id = prepared.id();
+        self.handle.inject(prepared)?;
+        Ok(id)
+    }
+
+    fn prepared(&self, name: String, effect: Effect, lasts: Lasts) -> Result<Prepared, Mistake> {
         self.role().check_faults()?;
         let fault = Fault {
             name,
             effect,
             begin: Begin::AtOnce,
-            lasts: Lasts::UntilEnded,
+            lasts,
             times: 1,
             seed: 1,
         };
@@ -248,10 +303,7 @@ impl Watch {
             writes: self.writes(),
             edges: &self.slots.edges,
         };
-        let prepared = Prepared::new(&fault, slots, &self.figures.board)?;
-        let id = prepared.id();
-        self.handle.inject(prepared)?;
-        Ok(id)
+        Prepared::new(&fault, slots, &self.figures.board)
     }
 
     /// Ends a fault. The next tick reads the order at its end, and the tick after that is the first without the fault.

@@ -6,9 +6,10 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use serde_json::json;
 use tickbus_base::time::Nanos;
-use tickbus_fieldbus::faults::{FaultStatus, Phase};
+use tickbus_driver::Force;
+use tickbus_fieldbus::faults::{FaultStatus, Lasts, Phase};
 use tickbus_fieldbus::{Link, LinkState};
-use tickbus_image::signal::{Area, SignalTable, Slot};
+use tickbus_image::signal::{Area, SignalTable};
 use tickbus_record::{Goal, History, Moment, Span, Tick};
 
 use crate::codec::Codec;
@@ -65,13 +66,6 @@ struct Seen {
     begun: u64,
     /// The number of ticks in the history from before the reset that preceded the fault.
     before: u64,
-}
-
-/// A signal, by its index, and the value that it is forced to.
-#[derive(Clone, Copy, Debug)]
-struct Force {
-    signal: usize,
-    value: Slot,
 }
 
 /// A fault has begun or ended.
@@ -140,11 +134,11 @@ impl Archive {
         self.notes.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Notes that the fault with this number forces a signal to a value. The history has what the simulation itself
+    /// Notes that the fault with this number forces a signal. The history has what the simulation itself
     /// wrote meanwhile, and the PLC got this.
-    pub(crate) fn note_force(&self, fault: u32, signal: usize, value: Slot) {
+    pub(crate) fn note_force(&self, fault: u32, force: Force) {
         let forces = &mut self.notes().forces;
-        forces.insert(fault, Force { signal, value });
+        forces.insert(fault, force);
         if forces.len() > MOST {
             forces.pop_first();
         }
@@ -203,9 +197,14 @@ impl Archive {
                 },
                 begins: is_active,
             };
-            // A fault that is over already began as well; when is not known, so both are in the tick of its end.
+            // A fault that is over already began as well; when is known only of one that lasts for a number of ticks.
+            let lasts = mark.force.map(|force| force.lasts);
             let begin = (has_begun && !is_active).then(|| Mark {
                 begins: true,
+                tick: match lasts {
+                    Some(Lasts::Ticks(ticks)) => tick.saturating_sub(ticks),
+                    _ => tick,
+                },
                 ..mark.clone()
             });
             for mark in begin.into_iter().chain([mark]) {
@@ -373,9 +372,10 @@ impl Archive {
         // The tables are consistent after a panic as well: every tick fills them again.
         let mut codec = self.codec.lock().unwrap_or_else(PoisonError::into_inner);
         let mut values = tick.values.clone();
-        for Force { signal, value } in faults.iter().filter_map(|mark| mark.force) {
-            if self.is_written(signal) {
-                values[signal] = value;
+        for mark in faults {
+            if let Some(force) = mark.force.filter(|force| self.is_written(force.signal)) {
+                let since = self.time_of(mark).unwrap_or(tick.time);
+                self.apply(force, since, tick.time, &mut values);
             }
         }
         if self.facts.has_bits {

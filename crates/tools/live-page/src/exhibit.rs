@@ -11,6 +11,7 @@ use tickbus_image::signal::Signal;
 use tickbus_web::Refused;
 
 use crate::archive::Archive;
+use crate::lists::Beside;
 use crate::picture::Picture;
 use crate::sheet::Sheet;
 
@@ -79,11 +80,16 @@ pub(crate) trait Exhibit: fmt::Debug + Send {
         None
     }
 
-    /// Forces a signal to a value.
-    fn force(&mut self, signal: &str, value: &str) -> Result<(), Refused>;
+    /// The file of the lists of signals.
+    fn lists(&self) -> Option<Arc<Beside>> {
+        None
+    }
 
-    /// Ends the force of a signal.
-    fn release(&mut self, signal: &str) -> Result<(), Refused>;
+    /// Forces signals to values, all from the same tick on, or none if one is refused.
+    fn force(&mut self, values: &[(String, String)]) -> Result<(), Refused>;
+
+    /// Ends the forces of signals in the same tick.
+    fn release(&mut self, signals: &[String]) -> Result<(), Refused>;
 
     /// Gives the simulation's model a fault of this value, or ends it.
     fn fault(&mut self, name: &str, _value: Option<&str>) -> Result<(), Refused> {

@@ -326,11 +326,11 @@ mod tests {
             &self.statistics
         }
 
-        fn force(&mut self, _signal: &str, _value: &str) -> Result<(), Refused> {
+        fn force(&mut self, _values: &[(String, String)]) -> Result<(), Refused> {
             Ok(())
         }
 
-        fn release(&mut self, _signal: &str) -> Result<(), Refused> {
+        fn release(&mut self, _signals: &[String]) -> Result<(), Refused> {
             Ok(())
         }
     }

@@ -7,8 +7,8 @@ const list = (() => {
   const frame = document.getElementById("list");
   const view = document.getElementById("window");
   const narrow = matchMedia("(max-width: 640px)");
-  /** The rows, `{ kind: "station" | "signal" | "trend", … }`, and the top of each, in pixels. */
-  let rows = [];
+  /** The rows, `{ kind: "station" | "signal" | "missing" | "trend", … }`, and the top of each, in pixels. */
+  let all = [];
   let tops = [0];
   let chosen = null;
   let chosenRow = -1;
@@ -17,16 +17,18 @@ const list = (() => {
   let isDue = false;
   /** The row elements by their contents, and the empty ones. */
   let shown = new Map();
-  const spare = { station: [], signal: [], trend: [] };
+  const spare = { station: [], signal: [], missing: [], trend: [] };
   /** For measurements: the number of redraws, and the longest one, in milliseconds. */
   const drawn = { count: 0, longest: 0 };
   let act = {};
 
-  const heightOf = { station: () => 38, signal: () => (narrow.matches ? 58 : 34), trend: () => TREND };
+  const heightOf = { station: () => 38, signal: () => (narrow.matches ? 58 : 34), missing: () => 34, trend: () => TREND };
 
   function fits(signal) {
     if (kind === "I" || kind === "Q") {
       if (signal.direction !== kind) return false;
+    } else if (kind === "pinned") {
+      if (watch.placeOf(signal) < 0) return false;
     } else if (kind === "forced" ? !signal.isForced : kind === "failsafe" && !signal.isFailSafe) {
       return false;
     }
@@ -35,37 +37,25 @@ const list = (() => {
 
   /** Rebuilds the rows. */
   function choose() {
-    rows = [];
-    let found = 0;
-    const isOne = plant.drivers.length === 1 && plant.drivers[0].stations.length <= 1;
-    for (const driver of plant.drivers) {
-      let station = null;
-      for (const signal of driver.signals) {
-        if (!fits(signal)) continue;
-        found += 1;
-        if (!isOne && signal.station !== station) rows.push({ kind: "station", key: `${driver.id}/${signal.station}/${signal.index}`, driver, station: signal.station });
-        station = signal.station;
-        rows.push({ kind: "signal", key: `s${plant.keyOf(signal)}`, signal });
-        if (signal.isOpen) rows.push({ kind: "trend", key: `t${plant.keyOf(signal)}`, signal });
-      }
-    }
+    const { rows: fitting, found } = rows.of(fits);
+    all = fitting;
     layOut();
-    chosenRow = rows.findIndex((row) => row.kind === "signal" && row.signal === chosen);
-    const all = plant.signals.length;
-    document.getElementById("found").textContent = found === all ? words.count(all, "signal", "signals") : `${words.whole(found)} of ${words.count(all, "signal", "signals")}`;
+    chosenRow = all.findIndex((row) => row.kind === "signal" && row.signal === chosen);
+    const count = plant.signals.length;
+    document.getElementById("found").textContent = found === count ? words.count(count, "signal", "signals") : `${words.whole(found)} of ${words.count(count, "signal", "signals")}`;
     const empty = document.getElementById("empty");
-    empty.hidden = found > 0 || all === 0;
-    const nothing = { forced: "No signal is forced.", failsafe: "No signal has its fail-safe value." };
+    empty.hidden = all.length > 0 || count === 0;
+    const nothing = { forced: "No signal is forced.", failsafe: "No signal has its fail-safe value.", pinned: "No signal is pinned: choose one and press W." };
     empty.textContent = (!wanted.length && nothing[kind]) || "No signal fits the filter.";
-    frame.setAttribute("aria-rowcount", rows.length + 1);
+    frame.setAttribute("aria-rowcount", all.length + 1);
     redraw();
   }
 
   function layOut() {
-    tops = new Array(rows.length + 1);
+    tops = new Array(all.length + 1);
     tops[0] = 0;
-    rows.forEach((row, i) => { tops[i + 1] = tops[i] + heightOf[row.kind](); });
-    view.style.height = tops[rows.length] + "px";
+    all.forEach((row, i) => { tops[i + 1] = tops[i] + heightOf[row.kind](); });
+    view.style.height = tops[all.length] + "px";
   }
 
   function redraw() {
@@ -89,7 +79,7 @@ const list = (() => {
     const [top, bottom] = seen();
     const first = Math.max(0, indexAt(tops, top - 80));
     const now = new Map();
-    for (let i = first; i < rows.length && tops[i] < bottom + 80; i++) now.set(rows[i].key, i);
+    for (let i = first; i < all.length && tops[i] < bottom + 80; i++) now.set(all[i].key, i);
     for (const [key, element] of shown) {
       if (now.has(key)) continue;
       shown.delete(key);
@@ -99,7 +89,7 @@ const list = (() => {
     }
     let before = null;
     for (const [key, i] of now) {
-      const row = rows[i];
+      const row = all[i];
       let element = shown.get(key);
       if (!element) {
         element = spare[row.kind].pop() ?? make[row.kind]();
@@ -140,6 +130,12 @@ const list = (() => {
     return it;
   }
 
+  function button(name, parent) {
+    const it = part(name, "", parent, "button");
+    it.type = "button";
+    return it;
+  }
+
   let ids = 0;
   const make = {
     station() {
@@ -148,7 +144,20 @@ const list = (() => {
       element.setAttribute("role", "row");
       element.dataset.kind = "station";
       const cell = part("name", "rowheader", element);
-      element.parts = { name: part("", "", cell, "b"), facts: part("note", "", cell) };
+      const fold = button("fold", cell);
+      element.parts = { fold, name: part("", "", cell, "b"), facts: part("note", "", cell) };
+      return element;
+    },
+    missing() {
+      const element = document.createElement("div");
+      element.className = "row signal missing";
+      element.setAttribute("role", "row");
+      element.dataset.kind = "missing";
+      const name = part("name", "rowheader", element);
+      element.parts = { name: part("text", "", name), mark: part("tag", "", name) };
+      element.parts.mark.textContent = "not in this driver";
+      element.parts.unpin = button("pin", part("do", "gridcell", element));
+      element.parts.unpin.textContent = "×";
       return element;
     },
     signal() {
@@ -159,14 +168,15 @@ const list = (() => {
       element.setAttribute("role", "row");
       element.dataset.kind = "signal";
       const name = part("name", "rowheader", element);
-      const parts = { name: part("text", "", name), mark: part("tag", "", name) };
+      const pin = button("pin", name);
+      pin.tabIndex = -1;
+      const parts = { pin, name: part("text", "", name), mark: part("tag", "", name) };
       for (const cell of ["address", "value", "raw", "edges", "age"]) parts[cell] = part(cell, "gridcell", element);
       parts.lamp = part("lamp", "", parts.value);
       parts.number = part("number", "", parts.value);
       parts.unit = part("unit", "", parts.value);
       const cell = part("do", "gridcell", element);
-      parts.open = part("open", "", cell, "button");
-      parts.open.type = "button";
+      parts.open = button("open", cell);
       parts.open.tabIndex = -1;
       element.parts = parts;
       return element;
@@ -178,8 +188,7 @@ const list = (() => {
       element.dataset.kind = "trend";
       const cell = part("picture", "gridcell", element);
       const canvas = part("", "", cell, "canvas");
-      const length = part("length", "", cell, "button");
-      length.type = "button";
+      const length = button("length", cell);
       length.tabIndex = -1;
       length.title = "Another length of time";
       element.parts = { canvas, length };
@@ -194,23 +203,42 @@ const list = (() => {
   }
 
   const paint = {
-    station(element, { driver, station }) {
-      const line = plant.lineOf(driver)?.stations?.[station];
-      const name = driver.stations[station];
-      text(element, "name", plant.drivers.length > 1 ? (driver.stations.length > 1 ? `${driver.name} · ${name}` : driver.name) : name);
+    station(element, { key, title, driver, station, count }) {
+      element.group = key;
+      const line = driver && plant.lineOf(driver)?.stations?.[station];
+      const name = title ?? driver.stations[station];
+      const full = title ?? (plant.drivers.length > 1 ? (driver.stations.length > 1 ? `${driver.name} · ${name}` : driver.name) : name);
+      text(element, "name", full);
       const age = typeof line?.age_ms === "number" ? `, ${words.span(line.age_ms)} old` : "";
-      text(element, "facts", line?.state ? `${line.stale && line.age_ms !== null ? "stale" : line.state}${age}` : "");
+      const state = line?.state ? ` · ${line.stale && line.age_ms !== null ? "stale" : line.state}${age}` : "";
+      text(element, "facts", words.count(count, "signal", "signals") + state);
       flag(element, "is-stale", Boolean(line?.stale));
+      const isFolded = watch.isFolded(key);
+      text(element, "fold", isFolded ? "▸" : "▾");
+      set(element, "expanded", !isFolded, (it, yes) => it.parts.fold.setAttribute("aria-expanded", yes));
+      set(element, "label", full, (it, label) => it.parts.fold.setAttribute("aria-label", label));
+    },
+    missing(element, { pin }) {
+      element.pin = pin;
+      text(element, "name", watch.nameOf(pin));
+      set(element, "label", `Unpin ${watch.nameOf(pin)}`, (it, label) => { it.parts.unpin.setAttribute("aria-label", label); it.parts.unpin.title = label; });
     },
     signal(element, { signal }) {
       element.signal = signal;
-      const value = words.value(signal);
+      const value = format.value(signal);
       const isOn = signal.isBool && plant.number(signal) > 0.5;
       text(element, "name", signal.name);
       text(element, "address", signal.address);
       text(element, "number", value);
       text(element, "unit", signal.unit);
-      text(element, "raw", signal.isBool ? "" : signal.raw);
+      text(element, "raw", format.raw(signal));
+      flag(element, "long", value.length > 12 && value.length < 25);
+      flag(element, "longer", value.length > 24);
+      flag(element, "long-raw", value.length < 13 && watch.formatOf(signal) === "binary");
+      const isPinned = watch.placeOf(signal) >= 0;
+      text(element, "pin", isPinned ? "★" : "☆");
+      flag(element, "pinned", isPinned);
+      set(element, "pin-label", `${isPinned ? "Unpin" : "Pin"} ${signal.name}`, (it, label) => { it.parts.pin.setAttribute("aria-label", label); it.parts.pin.title = label; });
       text(element, "edges", signal.latch ? words.whole(signal.edges) : swallowed(signal));
       text(element, "age", words.span(plant.age(signal)));
       text(element, "mark", signal.isForced ? "forced" : signal.isFailSafe ? "fail-safe" : signal.isStale ? "stale" : "");
@@ -254,7 +282,7 @@ const list = (() => {
 
   function select(signal) {
     chosen = signal;
-    chosenRow = rows.findIndex((row) => row.kind === "signal" && row.signal === signal);
+    chosenRow = all.findIndex((row) => row.kind === "signal" && row.signal === signal);
     act.chosen(signal);
     redraw();
   }
@@ -278,13 +306,13 @@ const list = (() => {
     let last = chosenRow;
     for (let left = Math.abs(by); left > 0;) {
       at += step;
-      if (at < 0 || at >= rows.length) break;
-      if (rows[at].kind !== "signal") continue;
+      if (at < 0 || at >= all.length) break;
+      if (all[at].kind !== "signal") continue;
       last = at;
       left -= 1;
     }
     if (last < 0) return;
-    select(rows[last].signal);
+    select(all[last].signal);
     scrollTo(last);
   }
 
@@ -294,6 +322,12 @@ const list = (() => {
     choose();
   }
 
+  /** Moves a pinned signal up or down among the pins, and keeps it in sight. */
+  function moveOne(signal, by) {
+    watch.move(signal, by);
+    if (chosenRow >= 0) scrollTo(chosenRow);
+  }
+
   const page = () => Math.max(1, Math.floor((seen()[1] - seen()[0]) / heightOf.signal()) - 1);
   const keys = {
     ArrowDown: () => move(1),
@@ -301,17 +335,26 @@ const list = (() => {
     PageDown: () => move(page()),
     PageUp: () => move(-page()),
     Home: () => { chosenRow = -1; move(1); },
-    End: () => { chosenRow = rows.length; move(-1); },
+    End: () => { chosenRow = all.length; move(-1); },
     Enter: () => { if (chosen) toggle(chosen); },
     " ": () => { if (chosen) toggle(chosen); },
     f: () => act.force(chosen),
     a: () => act.analyse(chosen),
+    w: () => { if (chosen) watch.pin(chosen); },
+    x: () => { if (chosen) format.next(chosen); },
     Delete: () => act.release(chosen),
     Backspace: () => act.release(chosen),
     Escape: () => select(null),
   };
 
   frame.addEventListener("keydown", (event) => {
+    const by = { ArrowUp: -1, ArrowDown: 1 }[event.key];
+    if (event.altKey && by && chosen) {
+      event.preventDefault();
+      moveOne(chosen, by);
+      return;
+    }
+    if (event.target.closest("button") && (event.key === "Enter" || event.key === " ")) return;
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     const action = keys[event.key] ?? keys[event.key.toLowerCase()];
     if (!action) return;
@@ -321,8 +364,15 @@ const list = (() => {
 
   view.addEventListener("click", (event) => {
     const element = event.target.closest(".row");
-    if (!element?.signal) return;
-    if (event.target.closest(".length")) {
+    if (event.target.closest(".fold") || element?.dataset.kind === "station") {
+      watch.fold(element.group);
+    } else if (element?.dataset.kind === "missing") {
+      if (event.target.closest(".pin")) watch.unpin(element.pin);
+    } else if (!element?.signal) {
+      return;
+    } else if (event.target.closest(".pin")) {
+      watch.pin(element.signal);
+    } else if (event.target.closest(".length")) {
       trend.next();
       redraw();
     } else if (event.target.closest(".open")) {
@@ -332,6 +382,34 @@ const list = (() => {
     }
   });
 
+  // A signal is dragged onto a pinned one, and takes its place.
+
+  let dragged = null;
+  let touched = -Infinity;
+  const rowUnder = (event) => dragged && event.target.closest(".row.pinned");
+  const mark = (row) => { for (const element of shown.values()) element.classList.toggle("drop", element === row); };
+  view.addEventListener("dragstart", (event) => { dragged = event.target.closest?.(".row.signal")?.signal ?? null; });
+  view.addEventListener("dragover", (event) => {
+    const row = rowUnder(event);
+    mark(row);
+    if (row) event.preventDefault();
+  });
+  view.addEventListener("drop", (event) => {
+    const row = rowUnder(event);
+    if (!row) return;
+    event.preventDefault();
+    watch.place(dragged, watch.placeOf(row.signal));
+  });
+  document.addEventListener("dragend", () => {
+    dragged = null;
+    mark(null);
+  });
+  // By the last change: not while somebody is about to click.
+  view.addEventListener("pointermove", () => { touched = performance.now(); }, { passive: true });
+  setInterval(() => {
+    if (watch.order === "changed" && !plant.isPast && !document.hidden && performance.now() - touched > 2000) choose();
+  }, 1000);
+
   document.addEventListener("scroll", redraw, { passive: true, capture: true });
   window.addEventListener("resize", redraw);
   narrow.addEventListener("change", () => {
@@ -340,7 +418,7 @@ const list = (() => {
   });
 
   return {
-    choose, redraw, draw, select, find, toggle, isMoving, drawn,
+    choose, redraw, draw, select, find, toggle, isMoving, drawn, moveOne,
     filter(text) {
       wanted = text.toLowerCase().split(/\s+/).filter(Boolean);
       choose();

@@ -39,10 +39,19 @@
     return true;
   }
 
+  /** Forces a signal, in the chosen way. */
   function force(signal, text) {
     if (!signal || isPast()) return;
     const value = text.trim().replace(",", ".").replace("−", "-");
-    change("PUT", pathOf(signal), value, `${signal.name} is forced to ${value}${signal.unit ? ` ${signal.unit}` : ""}.`);
+    const shown = `${value}${signal.unit ? ` ${signal.unit}` : ""}`;
+    const time = get("force-time").value.trim().replace(",", ".");
+    const [suffix, done] = {
+      hold: ["", `${signal.name} is forced to ${shown}.`],
+      once: [" once", `${signal.name} was ${shown} for one tick.`],
+      pulse: [` for ${time}`, `${signal.name} is forced to ${shown} for ${time}.`],
+      ramp: [` within ${time}`, `${signal.name} goes to ${shown} within ${time}, and is held there.`],
+    }[get("force-way").value];
+    change("PUT", pathOf(signal), value + suffix, done);
   }
 
   function release(signal) {
@@ -92,9 +101,19 @@
     if (plant.drivers.length > 1) facts.push(signal.driver.name);
     write(get("chosen-facts"), facts.join(" · "));
     get("chosen-tools").hidden = !mayForce || !signal.isWritable;
+    get("force-ramp").disabled = signal.isBool;
+    if (signal.isBool && get("force-way").value === "ramp") get("force-way").value = "hold";
+    get("force-time-of").hidden = !["pulse", "ramp"].includes(get("force-way").value);
+    write(get("force-time-word"), get("force-way").value === "ramp" ? "within" : "for");
     get("force-bool").hidden = !signal.isBool;
     get("force-number").hidden = signal.isBool;
     write(get("force-unit"), signal.unit);
+    const isPinned = watch.placeOf(signal) >= 0;
+    write(get("pin"), isPinned ? "Unpin" : "Pin");
+    get("pin").setAttribute("aria-pressed", String(isPinned));
+    get("pin-order").hidden = !isPinned;
+    get("format-of").hidden = signal.isBool;
+    if (document.activeElement !== get("format")) get("format").value = watch.formatOf(signal);
     write(get("trend"), signal.isOpen ? "Close trend" : "Trend");
     if (isNew) {
       // To the last digit: confirming it unchanged holds the current value.
@@ -131,6 +150,19 @@
     release,
     analyse: analyser.add,
   });
+  watch.begin({
+    say,
+    changed() {
+      sets.show();
+      list.choose();
+      if (list.chosen) showChosen(list.chosen);
+    },
+    opened: (hasPins) => { if (hasPins !== (list.kind === "pinned")) choose(hasPins ? "pinned" : "all"); },
+  });
+  sets.begin({
+    say, change, isPast,
+    forced: () => plant.signals.filter(plant.isForcedNow),
+  });
   touch.begin({
     say, canForce, change, pathOf, release,
     force: edit,
@@ -148,6 +180,7 @@
     event.preventDefault();
     if (list.chosen && !list.chosen.isBool) force(list.chosen, forceValue.value);
   });
+  get("force-way").addEventListener("change", () => showChosen(list.chosen));
   get("force-true").addEventListener("click", () => force(list.chosen, "TRUE"));
   get("force-false").addEventListener("click", () => force(list.chosen, "FALSE"));
   get("release").addEventListener("click", () => release(list.chosen));
@@ -157,6 +190,10 @@
     showChosen(list.chosen);
   });
   get("analyse").addEventListener("click", () => analyser.add(list.chosen));
+  get("pin").addEventListener("click", () => watch.pin(list.chosen));
+  get("pin-up").addEventListener("click", () => list.moveOne(list.chosen, -1));
+  get("pin-down").addEventListener("click", () => list.moveOne(list.chosen, 1));
+  get("format").addEventListener("change", () => watch.setFormat(list.chosen, get("format").value));
   get("let-go").addEventListener("click", () => {
     list.select(null);
     say("");
@@ -260,6 +297,7 @@
     document.body.classList.toggle("only-runs", plant.drivers.length > 0 && plant.drivers.every((driver) => driver.isRun));
     document.body.classList.toggle("is-recording", isRecording());
     list.renew();
+    watch.look();
     analyser.renew();
     pictures.load();
     if (!painted) requestAnimationFrame(() => requestAnimationFrame(() => { painted = performance.now(); }));
@@ -308,6 +346,7 @@
     },
     access(isRight, refusal) {
       mayForce = isRight;
+      watch.access(isRight);
       if (refusal) say(`Read-only: ${refusal}`);
       else if (get("status").textContent.startsWith("Read-only")) say("");
       redraw();

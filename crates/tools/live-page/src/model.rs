@@ -92,17 +92,13 @@ impl Model {
                 let released: Vec<_> = released.collect();
                 released.into_iter().collect()
             }
-            Order::Force {
-                driver,
-                signal,
-                value,
-            } => self.named(*driver)?.force(signal, value),
+            Order::Force { driver, values } => self.named(*driver)?.force(values),
             Order::Fault {
                 driver,
                 name,
                 value,
             } => self.named(*driver)?.fault(name, value.as_deref()),
-            Order::Release { driver, signal } => self.named(*driver)?.release(signal),
+            Order::Release { driver, signals } => self.named(*driver)?.release(signals),
         }
     }
 

@@ -1,5 +1,7 @@
 //! The options of a driver on the page.
 
+use std::path::PathBuf;
+
 use tickbus_base::time::Nanos;
 
 use crate::picture::Picture;
@@ -12,4 +14,6 @@ pub struct Options {
     pub grace: Option<Nanos>,
     /// The picture of the machine.
     pub picture: Option<Picture>,
+    /// The file of its lists of signals, which need not exist; without one no list can be kept.
+    pub lists: Option<PathBuf>,
 }

@@ -6,21 +6,19 @@ use tickbus_web::{Change, Refused, Verb};
 /// A change ordered by a request.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Order {
-    /// Force a signal to a value.
+    /// Force signals to values, all from the same tick on.
     Force {
         /// The driver's id.
         driver: i32,
-        /// The signal's name.
-        signal: String,
-        /// The value, as it was written.
-        value: String,
+        /// The signals' names, and the values as they were written.
+        values: Vec<(String, String)>,
     },
-    /// End the force of a signal.
+    /// End the forces of signals, in the same tick.
     Release {
         /// The driver's id.
         driver: i32,
-        /// The signal's name.
-        signal: String,
+        /// The signals' names.
+        signals: Vec<String>,
     },
     /// Give the simulation's model a fault, or end it.
     Fault {
@@ -36,7 +34,8 @@ pub enum Order {
 }
 
 /// The order in a request: `PUT /force/4711/LA1%20run` with the value as its body, `DELETE` of the same path, `DELETE
-/// /force`, or `PUT` and `DELETE /fault/4711/hose` for a fault of the simulation's model.
+/// /force`, or `PUT` and `DELETE /fault/4711/hose` for a fault of the simulation's model. `PUT /force/4711` has pairs of
+/// names and values in its body, `DELETE /force/4711` names.
 ///
 /// # Errors
 ///
@@ -55,6 +54,11 @@ pub fn order(change: &Change) -> Result<Order, Refused> {
     }
     let fault = change.path.strip_prefix("/fault");
     let path = path.or(fault).and_then(|rest| rest.strip_prefix('/'));
+    if let Some(id) = rest.and_then(|rest| rest.strip_prefix('/'))
+        && let Ok(driver) = id.parse()
+    {
+        return several(driver, change);
+    }
     let Some((id, name)) = path.and_then(|rest| rest.split_once('/')) else {
         return refused(404, format!("there is nothing to change here; {RIGHT}"));
     };
@@ -74,10 +78,32 @@ pub fn order(change: &Change) -> Result<Order, Refused> {
     Ok(match change.verb {
         Verb::Put => Order::Force {
             driver,
-            signal,
-            value: change.body.clone(),
+            values: vec![(signal, change.body.clone())],
         },
-        Verb::Delete => Order::Release { driver, signal },
+        Verb::Delete => Order::Release {
+            driver,
+            signals: vec![signal],
+        },
+    })
+}
+
+/// The order for several signals of a driver.
+fn several(driver: i32, change: &Change) -> Result<Order, Refused> {
+    let wrong = |right: &str| {
+        let text = format!("the body does not name the signals; send {right}");
+        move |_: serde_json::Error| Refused { status: 400, text }
+    };
+    Ok(match change.verb {
+        Verb::Put => {
+            let values = serde_json::from_str(&change.body);
+            let values = values.map_err(wrong("[[\"NAME\", \"VALUE\"], …]"))?;
+            Order::Force { driver, values }
+        }
+        Verb::Delete => {
+            let signals = serde_json::from_str(&change.body);
+            let signals = signals.map_err(wrong("[\"NAME\", …]"))?;
+            Order::Release { driver, signals }
+        }
     })
 }
 
@@ -99,13 +125,12 @@ mod tests {
         let signal = || "LA1 run".to_owned();
         let force = Order::Force {
             driver: 4711,
-            signal: signal(),
-            value: "TRUE".to_owned(),
+            values: vec![(signal(), "TRUE".to_owned())],
         };
         assert_eq!(read(Verb::Put, "/force/4711/LA1%20run", "TRUE"), Ok(force));
         let release = Order::Release {
             driver: 4711,
-            signal: "a/b".to_owned(),
+            signals: vec!["a/b".to_owned()],
         };
         for path in [
             "/force/4711/a/b",
@@ -114,6 +139,20 @@ mod tests {
         ] {
             assert_eq!(read(Verb::Delete, path, ""), Ok(release.clone()), "{path}");
         }
+        let pairs = r#"[["a", "1"], ["b", "5 once"]]"#;
+        let values = [("a", "1"), ("b", "5 once")].map(|(a, b)| (a.to_owned(), b.to_owned()));
+        let force = Order::Force {
+            driver: 7,
+            values: values.into(),
+        };
+        assert_eq!(read(Verb::Put, "/force/7", pairs), Ok(force));
+        let signals = ["a", "b"].map(str::to_owned).into();
+        let release = Order::Release { driver: 7, signals };
+        assert_eq!(
+            read(Verb::Delete, "/force/7/", r#"["a", "b"]"#),
+            Ok(release)
+        );
+        assert_eq!(read(Verb::Delete, "/force/7", "a"), Err(400));
         for (verb, value) in [(Verb::Put, Some("0.4".to_owned())), (Verb::Delete, None)] {
             let fault = Order::Fault {
                 driver: 7,
@@ -130,7 +169,7 @@ mod tests {
             ("/", 404),
             ("/forced", 404),
             ("/signals", 404),
-            ("/force/4711", 404),
+            ("/force/4711", 400),
             ("/fault", 404),
             ("/fault/x/hose", 400),
             ("/force/x/LA1", 400),

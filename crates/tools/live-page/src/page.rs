@@ -13,6 +13,7 @@ use tickbus_web::{Answer, Asset, Change, Document, Outcome, Site, State};
 use crate::assets::ASSETS;
 use crate::exhibit::Exhibit;
 use crate::keeper::{Inbox, Keeper, Wish};
+use crate::lists::LARGEST;
 use crate::model::Shared;
 use crate::options::Options;
 use crate::past::{Door, Past};
@@ -150,8 +151,23 @@ impl Site for LiveSite {
         }
     }
 
+    fn longest_body(&self, path: &str) -> usize {
+        if Door::leads_to(path) {
+            LARGEST
+        } else if path.starts_with("/force") {
+            // As many signals as can be forced, with long names.
+            64 << 10
+        } else {
+            4096
+        }
+    }
+
     fn change(&self, change: Change, answer: Answer<Outcome>) {
-        self.0.put(Wish::Change(change, answer));
+        if Door::leads_to(&change.path) {
+            self.1.change(change, answer);
+        } else {
+            self.0.put(Wish::Change(change, answer));
+        }
     }
 
     fn heard(&self, viewers: usize) {

@@ -1,4 +1,5 @@
-//! The requests about the past, on a thread of their own: a search through a long history must not delay the present.
+//! The requests about the past and about lists of signals, on a thread of their own: neither a search through a long
+//! history nor a slow disk must delay the present.
 
 use std::io::{self, Cursor};
 use std::sync::Arc;
@@ -7,16 +8,19 @@ use std::thread::{self, JoinHandle};
 
 use tickbus_record::{Format, Moment, Recording};
 use tickbus_report::{Contents, DEFAULT_BUDGET};
-use tickbus_web::{Answer, Document};
+use tickbus_web::{Answer, Change, Document, Outcome, Refused, Verb};
 
 use crate::archive::{Archive, time};
 use crate::exhibit::Exhibit;
+use crate::lists::{self, Beside};
 use crate::model::Shared;
 use crate::trends;
 
 /// The paths of the past.
 const HISTORY: &str = "/history/";
 const TREND: &str = "/trend/";
+/// The path of the lists of signals: their file is read and written here, since a disk can be slow.
+const LISTS: &str = "/lists/";
 
 /// The largest file that is saved, in bytes.
 const LARGEST: usize = 512 << 20;
@@ -24,7 +28,12 @@ const LARGEST: usize = 512 << 20;
 const JSON: &str = "application/json";
 
 /// A request; `None` ends the thread.
-type Wish = Option<(String, Answer<Option<Document>>)>;
+type Wish = Option<Order>;
+
+enum Order {
+    Get(String, Answer<Option<Document>>),
+    Change(Change, Answer<Outcome>),
+}
 
 /// The thread; dropping it ends it after the request that it works on.
 #[derive(Debug)]
@@ -43,10 +52,14 @@ impl Past {
         let thread = thread::Builder::new().name("page past".to_owned());
         let thread = thread.spawn(move || {
             // Doors may be left after the end, so the end of the queue is no signal.
-            while let Ok(Some((path, answer))) = taken.recv() {
-                // Who scrubs or has left does not wait for the moments in between.
-                if answer.is_wanted() {
-                    answer.give(document(&model, &path));
+            while let Ok(Some(order)) = taken.recv() {
+                match order {
+                    // Who scrubs or has left does not wait for the moments in between.
+                    Order::Get(path, answer) if answer.is_wanted() => {
+                        answer.give(document(&model, &path));
+                    }
+                    Order::Get(..) => {}
+                    Order::Change(order, answer) => answer.give(change(&model, &order)),
                 }
             }
         })?;
@@ -73,12 +86,19 @@ impl Drop for Past {
 impl Door {
     /// True if a path is one of the past.
     pub(crate) fn leads_to(path: &str) -> bool {
-        path.starts_with(HISTORY) || path.starts_with(TREND)
+        [HISTORY, TREND, LISTS]
+            .iter()
+            .any(|begin| path.starts_with(begin))
     }
 
     pub(crate) fn ask(&self, path: &str, answer: Answer<Option<Document>>) {
         // After the end nobody answers, which the room reports.
-        let _ = self.0.send(Some((path.to_owned(), answer)));
+        let _ = self.0.send(Some(Order::Get(path.to_owned(), answer)));
+    }
+
+    pub(crate) fn change(&self, change: Change, answer: Answer<Outcome>) {
+        // As above.
+        let _ = self.0.send(Some(Order::Change(change, answer)));
     }
 }
 
@@ -87,6 +107,10 @@ fn document(model: &Shared, path: &str) -> Option<Document> {
     if let Some(path) = path.strip_prefix(TREND) {
         let (id, path) = path.split_once('/')?;
         let text = trends::document(&*archive(model, id)?, path)?;
+        return Some(Document { kind: JSON, text });
+    }
+    if let Some(id) = path.strip_prefix(LISTS) {
+        let text = lists::document(&*beside(model, id)?);
         return Some(Document { kind: JSON, text });
     }
     let mut parts = path.strip_prefix(HISTORY)?.split('/');
@@ -104,6 +128,32 @@ fn document(model: &Shared, path: &str) -> Option<Document> {
         _ => return None,
     };
     Some(Document { kind: JSON, text })
+}
+
+/// Changes a list: `/lists/ID/list` or `/lists/ID/set`.
+fn change(model: &Shared, change: &Change) -> Outcome {
+    let path = change.path.strip_prefix(LISTS).unwrap_or_default();
+    let found = path.split_once('/');
+    let found = found.and_then(|(id, what)| Some((beside(model, id)?, what)));
+    match (found, change.verb) {
+        (Some((beside, what)), Verb::Put) => lists::change(&beside, what, &change.body),
+        (Some(_), Verb::Delete) => Err(Refused {
+            status: 405,
+            text: "a list is removed by PUT with \"is\": null, and how it was".to_owned(),
+        }),
+        (None, _) => Err(Refused {
+            status: 404,
+            text:
+                "no driver with this id has a file for lists; PUT /lists/ID/list or /lists/ID/set"
+                    .to_owned(),
+        }),
+    }
+}
+
+/// The file of the lists of the exhibit with this id.
+fn beside(model: &Shared, id: &str) -> Option<Arc<Beside>> {
+    let id = id.parse().ok()?;
+    model.with(|model| model.driver(id).and_then(Exhibit::lists))
 }
 
 /// The past of the exhibit with this id.

@@ -1,6 +1,7 @@
 //! A recording on the page: the signals of a file, after the fact. Nothing runs, and nothing can be forced.
 
 use std::collections::BTreeSet;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use tickbus_base::Mistake;
@@ -15,6 +16,7 @@ use tickbus_web::Refused;
 use crate::archive::{Archive, Facts};
 use crate::exhibit::Exhibit;
 use crate::line::{Line, Station};
+use crate::lists::Beside;
 use crate::picture::Picture;
 use crate::sheet::{DriverJson, STALE, Sheet, SignalJson};
 
@@ -33,6 +35,7 @@ pub struct Recorded {
     picture: Option<Picture>,
     /// Signals of which the recording has edges, but no driver.cfg says of which kind.
     guessed_latches: BTreeSet<String>,
+    lists: Option<Arc<Beside>>,
 }
 
 impl Recorded {
@@ -121,6 +124,7 @@ impl Recorded {
             ticks,
             picture: None,
             guessed_latches,
+            lists: None,
         })
     }
 
@@ -151,6 +155,12 @@ impl Recorded {
     /// Shows this picture of the machine.
     pub fn set_picture(&mut self, picture: Picture) {
         self.picture = Some(picture);
+    }
+
+    /// Shows the lists of signals in this file, which need not exist.
+    pub fn set_lists(&mut self, path: PathBuf) {
+        let signals = self.archive.facts.table.signals.clone();
+        self.lists = Some(Arc::new(Beside { path, signals }));
     }
 }
 
@@ -425,6 +435,7 @@ impl Exhibit for ShownRecording {
             kind: "recording",
             role: role(&self.recorded.role).map_or("of an unknown end", Role::name),
             picture: self.recorded.picture.is_some(),
+            lists: self.recorded.lists.is_some(),
             stations: self.recorded.stations.iter().map(|name| &**name).collect(),
             signals: signals.collect(),
         };
@@ -443,21 +454,26 @@ impl Exhibit for ShownRecording {
         &self.statistics
     }
 
+    fn lists(&self) -> Option<Arc<Beside>> {
+        self.recorded.lists.clone()
+    }
+
     fn picture(&self) -> Option<&Picture> {
         self.recorded.picture.as_ref()
     }
 
-    fn force(&mut self, signal: &str, _value: &str) -> Result<(), Refused> {
+    fn force(&mut self, values: &[(String, String)]) -> Result<(), Refused> {
+        let name = values.first().map_or("", |(name, _)| name);
         Err(Refused {
             status: 409,
             text: format!(
                 "\"{}\" is not forced: this page shows a recording; force it on the page of a running simulation",
-                shown(signal)
+                shown(name)
             ),
         })
     }
 
-    fn release(&mut self, _signal: &str) -> Result<(), Refused> {
+    fn release(&mut self, _signals: &[String]) -> Result<(), Refused> {
         // No signal is forced.
         Ok(())
     }

@@ -500,6 +500,7 @@ impl Exhibit for ShownRun {
             kind: "sync",
             role: "server",
             picture: false,
+            lists: false,
             stations: stations.chain(self.has_logic().then_some(LOGIC)).collect(),
             signals: signals.collect(),
         };
@@ -534,18 +535,19 @@ impl Exhibit for ShownRun {
         &self.statistics
     }
 
-    fn force(&mut self, signal: &str, _value: &str) -> Result<(), Refused> {
+    fn force(&mut self, values: &[(String, String)]) -> Result<(), Refused> {
+        let name = values.first().map_or("", |(name, _)| name);
         Err(Refused {
             status: 409,
             text: format!(
                 "\"{}\" is not forced: the run \"{}\" would be another one; have a client write it",
-                tickbus_base::toml_text::shown(signal),
+                tickbus_base::toml_text::shown(name),
                 self.name
             ),
         })
     }
 
-    fn release(&mut self, _signal: &str) -> Result<(), Refused> {
+    fn release(&mut self, _signals: &[String]) -> Result<(), Refused> {
         // No signal is forced.
         Ok(())
     }

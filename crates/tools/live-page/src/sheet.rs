@@ -259,6 +259,8 @@ pub(crate) struct DriverJson<'a> {
     pub(crate) kind: &'static str,
     pub(crate) role: &'static str,
     pub(crate) picture: bool,
+    /// True if it has a file for lists of signals.
+    pub(crate) lists: bool,
     pub(crate) stations: Vec<&'a str>,
     pub(crate) signals: Vec<SignalJson<'a>>,
 }

@@ -15,11 +15,13 @@ use tickbus_web::Refused;
 use crate::archive::{Archive, Facts};
 use crate::codec::Codec;
 use crate::exhibit::{Exhibit, Freshness};
+use crate::forcing::{self, Way};
 use crate::line::{self, age_now, millis};
+use crate::lists::Beside;
 use crate::options::Options;
 use crate::picture::Picture;
 use crate::sheet::{DriverJson, FAIL_SAFE, FORCED, Row, STALE, Sheet, SignalJson, UNKNOWN};
-use crate::value::{Number, parse};
+use crate::value::Number;
 
 /// A simulation that has not ticked for this long stands still.
 const SILENT: Nanos = Nanos::from_millis(500);
@@ -33,6 +35,7 @@ pub(crate) struct Shown {
     options: Options,
     sheet: Sheet,
     archive: Option<Arc<Archive>>,
+    lists: Option<Arc<Beside>>,
     codec: Codec,
     /// By the index of the signal.
     forced: BTreeMap<usize, Force>,
@@ -51,7 +54,18 @@ pub(crate) struct Shown {
 struct Force {
     /// The fault's number.
     fault: u32,
+    /// The value that it has, or that a ramp reaches.
     value: Slot,
+    way: Way,
+}
+
+impl Force {
+    /// The value at this moment.
+    fn now(&self, watch: &Watch) -> Slot {
+        let ramp = matches!(self.way, Way::Ramp(_));
+        let value = ramp.then(|| watch.ramp_value(self.fault)).flatten();
+        value.unwrap_or(self.value)
+    }
 }
 
 impl Shown {
@@ -67,11 +81,16 @@ impl Shown {
             };
             Arc::new(Archive::new(Arc::clone(history), facts))
         });
+        let lists = options.lists.clone().map(|path| {
+            let signals = config.table.signals.clone();
+            Arc::new(Beside { path, signals })
+        });
         let values: Vec<Slot> = watch.view(|view| view.slots.to_vec());
         let mut driver = Self {
             id,
             sheet: Sheet::new(&values),
             archive,
+            lists,
             codec: Codec::new(&config.table),
             forced: BTreeMap::new(),
             faults: BTreeMap::new(),
@@ -110,7 +129,7 @@ impl Shown {
         for (index, signal) in table.signals.iter().enumerate() {
             if signal.area == writes {
                 if let Some(force) = forced.get(&index) {
-                    values[index] = force.value;
+                    values[index] = force.now(watch);
                 }
                 if has_stopped {
                     values[index] = signal.fail_safe;
@@ -216,7 +235,7 @@ impl Shown {
             forced: self
                 .forced
                 .get(&index)
-                .map(|force| Number::of(signal, force.value)),
+                .map(|force| Number::of(signal, force.now(&self.watch))),
         }
     }
 
@@ -282,6 +301,7 @@ impl Exhibit for Shown {
             kind: self.watch.bus_kind(),
             role: self.watch.role().name(),
             picture: self.options.picture.is_some(),
+            lists: self.lists.is_some(),
             stations: stations.map(|station| station.name.as_str()).collect(),
             signals: signals.map(|index| self.signal(index)).collect(),
         };
@@ -319,46 +339,60 @@ impl Exhibit for Shown {
         self.options.picture.as_ref()
     }
 
-    fn force(&mut self, name: &str, value: &str) -> Result<(), Refused> {
+    fn lists(&self) -> Option<Arc<Beside>> {
+        self.lists.clone()
+    }
+
+    fn force(&mut self, values: &[(String, String)]) -> Result<(), Refused> {
         self.look_at_forced();
-        let index = self.position(name)?;
-        let signal = &self.watch.config().table.signals[index];
-        let value = parse(value, signal).map_err(|text| Refused { status: 400, text })?;
-        let before = self.forced.get(&index).copied();
-        if before.is_some_and(|force| force.value == value) {
+        let mut wanted: BTreeMap<usize, (Slot, Way)> = BTreeMap::new();
+        for (name, text) in values {
+            let index = self.position(name)?;
+            let signal = &self.watch.config().table.signals[index];
+            let read = forcing::read(text, signal);
+            let (value, way) = read.map_err(|text| Refused { status: 400, text })?;
+            let is_held = |force: &Force| force.value == value && force.way == Way::Hold;
+            if way != Way::Hold || !self.forced.get(&index).is_some_and(is_held) {
+                wanted.insert(index, (value, way));
+            }
+        }
+        if wanted.is_empty() {
             return Ok(());
         }
-        let refused = |mistake: Mistake| Refused {
-            status: 409,
-            text: mistake.to_string(),
-        };
-        let fault = self.watch.force(index, value).map_err(refused)?;
-        if let Some(archive) = &self.archive {
-            archive.note_force(fault, index, value);
-        }
-        self.forced.insert(index, Force { fault, value });
-        // End the old fault together with the new one, so that the signal is held throughout.
-        if let Some(before) = before
-            && self.watch.end_fault(before.fault).is_err()
+        // The old faults end together with the new ones, so that each signal is held throughout.
+        let before = wanted.keys().filter_map(|index| self.forced.get(index));
+        let ends = before.map(|force| force.fault).collect();
+        let forces = wanted.iter().map(|(index, (value, way))| {
+            let from = self.forced.get(index).map(|force| force.now(&self.watch));
+            way.force(*index, *value, from)
+        });
+        let forces: Vec<_> = forces.collect();
+        let faults = self.watch.force_all(&forces, ends).map_err(conflict)?;
+        for (fault, (force, (index, (value, way)))) in
+            faults.into_iter().zip(forces.iter().zip(wanted))
         {
-            self.ending.push(before.fault);
+            if let Some(archive) = &self.archive {
+                archive.note_force(fault, *force);
+            }
+            self.forced.insert(index, Force { fault, value, way });
         }
         Ok(())
     }
 
-    fn release(&mut self, name: &str) -> Result<(), Refused> {
-        let index = self.position(name)?;
-        let Some(force) = self.forced.get(&index) else {
-            // The signal is not forced, as requested.
+    fn release(&mut self, signals: &[String]) -> Result<(), Refused> {
+        let places: Result<Vec<usize>, Refused> =
+            signals.iter().map(|name| self.position(name)).collect();
+        let mut places = places?;
+        // A signal that is not forced is as requested.
+        places.retain(|index| self.forced.contains_key(index));
+        let ends: Vec<u32> = places.iter().map(|at| self.forced[at].fault).collect();
+        if ends.is_empty() {
             return Ok(());
-        };
-        self.watch
-            .end_fault(force.fault)
-            .map_err(|mistake| Refused {
-                status: 409,
-                text: mistake.to_string(),
-            })?;
-        self.forced.remove(&index);
+        }
+        self.watch.force_all(&[], ends).map_err(conflict)?;
+        for index in places {
+            self.forced.remove(&index);
+        }
         Ok(())
     }
 
@@ -400,12 +434,7 @@ impl Exhibit for Shown {
         };
         self.forced.retain(|_, force| remains(force.fault));
         self.faults.retain(|_, fault| remains(*fault));
-        refused.map_or(Ok(()), |mistake| {
-            Err(Refused {
-                status: 409,
-                text: mistake.to_string(),
-            })
-        })
+        refused.map_or(Ok(()), |mistake| Err(conflict(mistake)))
     }
 
     fn look_at_forced(&mut self) {
@@ -419,6 +448,14 @@ impl Exhibit for Shown {
     fn grace(&self) -> Option<Nanos> {
         let is_free = self.forced.is_empty() && self.faults.is_empty();
         self.options.grace.filter(|_| !is_free)
+    }
+}
+
+/// The simulation does not take it over.
+fn conflict(mistake: Mistake) -> Refused {
+    Refused {
+        status: 409,
+        text: mistake.to_string(),
     }
 }
 

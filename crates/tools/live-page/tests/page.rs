@@ -5,11 +5,16 @@
     reason = "tests, with small whole numbers"
 )]
 
+#[path = "page/forcing.rs"]
+mod forcing;
+#[path = "page/lists.rs"]
+mod lists;
 #[path = "page/past.rs"]
 mod past;
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -76,6 +81,18 @@ impl Simulation {
         keys: &str,
         pause: Duration,
         page: &Page,
+        place: (i32, &str),
+        grace: Option<Nanos>,
+    ) -> Self {
+        Self::start_beside(None, keys, pause, page, place, grace)
+    }
+
+    /// Like [`start_with`](Self::start_with), with this file of lists.
+    fn start_beside(
+        lists: Option<PathBuf>,
+        keys: &str,
+        pause: Duration,
+        page: &Page,
         (id, name): (i32, &str),
         grace: Option<Nanos>,
     ) -> Self {
@@ -89,6 +106,7 @@ impl Simulation {
         let options = Options {
             grace,
             picture: None,
+            lists,
         };
         let member = page.live.join(driver.watch(), options);
         let is_over = Arc::<AtomicBool>::default();
@@ -605,6 +623,7 @@ fn what_a_plc_never_sent_is_not_exported_as_live() {
     let options = Options {
         grace: None,
         picture: None,
+        lists: None,
     };
     let _member = page.live.join(driver.watch(), options);
     let (is_over, page) = (AtomicBool::new(false), &page);

@@ -9,11 +9,11 @@ use serde_json::{Value as Json, json};
 use similar::TextDiff;
 use tickbus_base::toml_text::{Key, Shape};
 use tickbus_driver_cfg::{Kinds, keys};
+use tickbus_live_page::{OnDisk, Unwritten};
 
 use crate::check::{Checked, check};
 use crate::document::body;
 use crate::edit::{Edit, Made, Shapes, adopt, make};
-use crate::file::{OnDisk, Unwritten};
 use crate::history::History;
 use crate::news::News;
 use crate::sheet::Sheet;

@@ -45,6 +45,7 @@ fn studio() -> (tempfile::TempDir, Studio) {
                 options: Options {
                     grace: None,
                     picture: None,
+                    lists: None,
                 },
             })
         }),

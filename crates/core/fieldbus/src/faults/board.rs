@@ -11,6 +11,7 @@ use super::{FaultStatus, LIMIT, LineFault, Phase, TickTime};
 use tickbus_base::Mistake;
 use tickbus_base::statistics::Statistics;
 use tickbus_base::toml_text::shown;
+use tickbus_image::signal::Slot;
 
 /// The state of a driver's faults, shared by the tick, the bus and other threads.
 #[derive(Debug, Default)]
@@ -93,6 +94,13 @@ impl FaultBoard {
     pub(super) fn enter(&self, cell: &Cell, phase: Phase, moment: TickTime) {
         cell.enter(phase, moment);
         self.news.fetch_add(1, Ordering::Release);
+    }
+
+    /// The value that the ramp with this number has reached; `None` if it has not begun, or is no longer on the list.
+    pub fn ramp_value(&self, id: u32) -> Option<Slot> {
+        let cells = self.cells();
+        let cell = cells.iter().find(|cell| cell.id() == id)?;
+        (cell.begun() > 0).then(|| cell.value())
     }
 
     /// Takes the line faults that the bus has not adopted yet.

@@ -7,6 +7,7 @@ use super::TickTime;
 use super::fault::MODEL;
 use tickbus_base::os::{is_rarely_logged, is_told};
 use tickbus_base::time::Nanos;
+use tickbus_image::signal::Slot;
 
 /// The state of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,6 +65,8 @@ pub(super) struct Cell {
     begun: AtomicU64,
     since: AtomicI64,
     tick: AtomicU64,
+    /// The value that a ramp has reached.
+    value: AtomicU64,
     /// The number of beginnings and ends so far, including those of earlier faults of this name and kind; `told` is the
     /// number already logged.
     changes: AtomicU64,
@@ -81,6 +84,7 @@ impl Cell {
             begun: AtomicU64::new(0),
             since: AtomicI64::new(0),
             tick: AtomicU64::new(0),
+            value: AtomicU64::new(0),
             changes: AtomicU64::new(0),
             told: AtomicU64::new(0),
         }
@@ -101,6 +105,16 @@ impl Cell {
 
     pub(super) fn phase(&self) -> Phase {
         Phase::ALL[usize::from(self.phase.load(Ordering::Acquire)) % Phase::ALL.len()]
+    }
+
+    /// Shows the value that a ramp has reached.
+    pub(super) fn show(&self, value: Slot) {
+        self.value.store(value.unsigned(), Ordering::Relaxed);
+    }
+
+    /// The value that a ramp has reached.
+    pub(super) fn value(&self) -> Slot {
+        Slot::from_unsigned(self.value.load(Ordering::Relaxed))
     }
 
     /// The fault's name.

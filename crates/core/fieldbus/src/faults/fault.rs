@@ -46,6 +46,15 @@ pub enum Effect {
 pub enum SignalEffect {
     /// The signal is stuck at a value; `None` means the value that it has when the fault begins.
     Stuck(Option<Slot>),
+    /// The signal goes evenly to a value within a time, and is stuck there. Not for a BOOL.
+    Ramp {
+        /// The value at which it begins; `None` means the value that it has when the fault begins.
+        from: Option<Slot>,
+        /// The value at which it ends.
+        to: Slot,
+        /// The time that it takes.
+        within: Nanos,
+    },
     /// A BOOL is inverted, or each bit of a bit string.
     Invert,
     /// This number is added, in the signal's unit.
@@ -147,6 +156,7 @@ impl Fault {
     pub const fn kind(&self) -> &'static str {
         match self.effect {
             Effect::Signal(_, SignalEffect::Stuck(_)) => "stuck",
+            Effect::Signal(_, SignalEffect::Ramp { .. }) => "ramp",
             Effect::Signal(_, SignalEffect::Invert) => "invert",
             Effect::Signal(_, SignalEffect::Offset(_)) => "offset",
             Effect::Signal(_, SignalEffect::Noise(_) | SignalEffect::Flicker(_)) => "noise",
@@ -188,18 +198,21 @@ fn changed(change: SignalEffect, signal: &Signal) -> String {
             .trim_end()
             .to_owned()
     };
+    let valued = |slot: Slot| {
+        let whole = match signal.data_type {
+            DataType::Lint => slot.signed().to_string(),
+            _ => slot.unsigned().to_string(),
+        };
+        if signal.is_integer_slot() {
+            format!("{whole} {unit}").trim_end().to_owned()
+        } else {
+            measured(slot.real())
+        }
+    };
     match change {
         SignalEffect::Stuck(None) => "is stuck where it is".to_owned(),
-        SignalEffect::Stuck(Some(slot)) if signal.is_integer_slot() => {
-            let signed = signal.data_type == DataType::Lint;
-            let number = if signed {
-                slot.signed().to_string()
-            } else {
-                slot.unsigned().to_string()
-            };
-            format!("is stuck at {number} {unit}").trim_end().to_owned()
-        }
-        SignalEffect::Stuck(Some(slot)) => format!("is stuck at {}", measured(slot.real())),
+        SignalEffect::Stuck(Some(slot)) => format!("is stuck at {}", valued(slot)),
+        SignalEffect::Ramp { to, within, .. } => format!("goes to {} within {within}", valued(to)),
         SignalEffect::Invert => "is inverted".to_owned(),
         SignalEffect::Offset(by) => format!("is off by {}", measured(by)),
         SignalEffect::Noise(amplitude) => {

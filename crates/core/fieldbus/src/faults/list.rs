@@ -291,13 +291,28 @@ impl Faults {
             if let (Phase::Active, Kind::Written(fault) | Kind::Read(fault)) =
                 (phase, &mut entry.kind)
             {
-                fault.begin(slots);
+                fault.begin(slots, moment.time);
             }
             is_model_news |= matches!(entry.kind, Kind::Model(..));
             self.board.enter(&entry.cell, phase, moment);
         }
         if is_model_news {
             self.note_models();
+        }
+        if self.change_values {
+            self.climb(moment.time);
+        }
+    }
+
+    /// Lets the ramps take their values of this tick.
+    fn climb(&mut self, time: Nanos) {
+        let active = self.entries.iter_mut();
+        for entry in active.filter(|entry| entry.schedule.is_active()) {
+            if let Kind::Written(fault) | Kind::Read(fault) = &mut entry.kind
+                && let Some(value) = fault.climb(time)
+            {
+                entry.cell.show(value);
+            }
         }
     }
 

@@ -41,6 +41,7 @@ pub use section::{
     FAULT_KEYS, FAULT_KINDS, FORMER_FAULT_KINDS, LIMIT, Scope, model_value, read_file, read_one,
     read_sections,
 };
+pub use signal_fault::between;
 pub use tick_time::TickTime;
 
 #[cfg(test)]

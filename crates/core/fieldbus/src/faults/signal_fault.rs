@@ -2,6 +2,7 @@
 
 use super::SignalEffect;
 use super::random::Random;
+use tickbus_base::time::Nanos;
 use tickbus_image::signal::{DataType, Latch, Signal, Slot};
 
 /// One fault of a signal's value.
@@ -13,8 +14,10 @@ pub(super) struct SignalFault {
     kind: Kind,
     change: SignalEffect,
     random: Random,
-    /// The value at which the signal is stuck.
+    /// The value at which the signal is stuck, or that a ramp has reached.
     held: Slot,
+    /// The value at which a ramp begins, and when.
+    start: (Slot, Nanos),
     /// The level shown last, with which the next level is compared to find edges.
     level: bool,
     /// The true value and the true edge count, while the slots hold the changed ones.
@@ -27,6 +30,8 @@ enum Kind {
     Bit,
     /// A bit string as a number; this is the number with all bits set.
     Bits(u32),
+    /// Another integer of at most 32 bits, without a scale.
+    Whole,
     Real,
     Signed,
     Unsigned,
@@ -41,9 +46,44 @@ impl Kind {
             DataType::Byte if signal.scale.is_none() => Self::Bits(0xFF),
             DataType::Word if signal.scale.is_none() => Self::Bits(0xFFFF),
             DataType::Dword if signal.scale.is_none() => Self::Bits(u32::MAX),
+            data_type if data_type.is_integer() && signal.scale.is_none() => Self::Whole,
             _ => Self::Real,
         }
     }
+
+    /// The value on the way from one to another, after a part of the time.
+    #[expect(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        reason = "saturates; the ends are exact"
+    )]
+    fn between(self, (from, to): (Slot, Slot), (passed, within): (Nanos, Nanos)) -> Slot {
+        if passed >= within {
+            return to;
+        }
+        let share = passed.0.max(0) as f64 / within.0 as f64;
+        let step = |from: i128, to: i128| from + ((to - from) as f64 * share).round() as i128;
+        match self {
+            Self::Signed => {
+                let value = step(from.signed().into(), to.signed().into());
+                Slot::from_signed(i64::try_from(value).unwrap_or(to.signed()))
+            }
+            Self::Unsigned => {
+                let value = step(from.unsigned().into(), to.unsigned().into());
+                Slot::from_unsigned(u64::try_from(value).unwrap_or(to.unsigned()))
+            }
+            Self::Real => Slot::from_real(from.real() + (to.real() - from.real()) * share),
+            Self::Bit | Self::Bits(_) | Self::Whole => {
+                let (from, to) = (from.real(), to.real());
+                Slot::from_real((from + (to - from) * share).round())
+            }
+        }
+    }
+}
+
+/// The value of a ramp of a signal on its way from one value to another, after a part of its time.
+pub fn between(signal: &Signal, ends: (Slot, Slot), times: (Nanos, Nanos)) -> Slot {
+    Kind::of(signal).between(ends, times)
 }
 
 impl SignalFault {
@@ -61,6 +101,7 @@ impl SignalFault {
             change,
             random,
             held: Slot::default(),
+            start: (Slot::default(), Nanos::ZERO),
             level: false,
             truth: None,
         }
@@ -71,14 +112,26 @@ impl SignalFault {
         self.slot
     }
 
-    /// Begins the fault; the slots hold the true values.
-    pub(super) fn begin(&mut self, slots: &[Slot]) {
+    /// Begins the fault at a time; the slots hold the true values.
+    pub(super) fn begin(&mut self, slots: &[Slot], time: Nanos) {
         let slot = slots[self.slot];
         self.level = slot.real() != 0.0;
         self.held = match self.change {
             SignalEffect::Stuck(Some(value)) => value,
+            SignalEffect::Ramp { from, .. } => from.unwrap_or(slot),
             _ => slot,
         };
+        self.start = (self.held, time);
+    }
+
+    /// The value that a ramp has at a time; `None` for other faults.
+    pub(super) fn climb(&mut self, time: Nanos) -> Option<Slot> {
+        let SignalEffect::Ramp { to, within, .. } = self.change else {
+            return None;
+        };
+        let (start, since) = self.start;
+        self.held = self.kind.between((start, to), (time - since, within));
+        Some(self.held)
     }
 
     /// Replaces the value in the signal's slot by the changed one.
@@ -117,7 +170,7 @@ impl SignalFault {
 
     fn bent(&mut self, truth: Slot) -> Slot {
         match self.change {
-            SignalEffect::Stuck(_) => self.held,
+            SignalEffect::Stuck(_) | SignalEffect::Ramp { .. } => self.held,
             SignalEffect::Invert => self.inverted(truth),
             SignalEffect::Offset(by) => self.moved(truth, by),
             SignalEffect::Noise(amplitude) => {
@@ -138,7 +191,7 @@ impl SignalFault {
                 Slot::from_real(all - truth.real().round().clamp(0.0, all))
             }
             Kind::Signed | Kind::Unsigned => Slot::from_unsigned(!truth.unsigned()),
-            Kind::Real => Slot::from_real(-truth.real()),
+            Kind::Whole | Kind::Real => Slot::from_real(-truth.real()),
         }
     }
 
@@ -148,7 +201,9 @@ impl SignalFault {
         match self.kind {
             Kind::Signed => Slot::from_signed(truth.signed().saturating_add(whole)),
             Kind::Unsigned => Slot::from_unsigned(truth.unsigned().saturating_add_signed(whole)),
-            Kind::Bit | Kind::Bits(_) | Kind::Real => Slot::from_real(truth.real() + by),
+            Kind::Bit | Kind::Bits(_) | Kind::Whole | Kind::Real => {
+                Slot::from_real(truth.real() + by)
+            }
         }
     }
 }

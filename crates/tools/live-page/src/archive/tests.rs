@@ -1,10 +1,12 @@
 //! The marks of faults.
 
-use tickbus_image::signal::{DataType, Signal};
+use tickbus_image::signal::{DataType, Signal, Slot};
 use tickbus_record::{Column, Columns, ValueKind};
 
 use super::*;
+use crate::forcing::Way;
 use tickbus_fieldbus::Cause;
+use tickbus_record::TrendPoint;
 
 /// An archive of twenty ticks, one each millisecond, with one signal.
 fn archive() -> Archive {
@@ -137,8 +139,8 @@ fn a_forced_value_takes_the_place_of_the_one_that_the_simulation_wrote() {
     let own = archive.history.trend(0, None, (ms(0), ms(30)));
     assert_eq!(trend(0, 30), own);
     let first = own[0];
-    archive.note_force(1, 0, slot(5.0));
-    archive.note_force(2, 0, slot(6.0));
+    archive.note_force(1, Way::Hold.force(0, slot(5.0), None));
+    archive.note_force(2, Way::Hold.force(0, slot(6.0), None));
     archive.note_faults(&[forced(1, Phase::Active, 1, 3)], 0);
     let to_six = FaultStatus {
         what: "\"a\" is stuck at 6".to_owned(),
@@ -163,6 +165,47 @@ fn a_forced_value_takes_the_place_of_the_one_that_the_simulation_wrote() {
         state["values"][0][1].as_f64()
     };
     assert_eq!([2, 3, 8, 12].map(value), [0.0, 5.0, 6.0, 0.0].map(Some));
+}
+
+#[test]
+fn a_ramp_goes_evenly_and_one_tick_is_one_tick_however_rarely_the_page_looks() {
+    let archive = archive();
+    let ms = Nanos::from_millis;
+    let real = |points: Vec<TrendPoint>| -> Vec<(i64, f64)> {
+        let points = points.into_iter();
+        points
+            .map(|(at, value)| (at.0, value.expect("a value").real()))
+            .collect()
+    };
+    let trend = |from, to| {
+        let own = archive.history.trend(0, None, (ms(from), ms(to)));
+        real(archive.with_forces(0, own, ms(to)))
+    };
+    let up = Way::Ramp(ms(10)).force(0, Slot::from_real(100.0), None);
+    archive.note_force(1, up);
+    archive.note_faults(&[forced(1, Phase::Active, 1, 3)], 0);
+    let points = trend(0, 30);
+    assert_eq!(points.len(), 101, "{points:?}");
+    assert!(points.contains(&(8_000_000, 50.0)), "{points:?}");
+    assert_eq!(points.last(), Some(&(13_000_000, 100.0)));
+    let value = |tick: u64| {
+        let state = archive.state(Moment::Tick(tick), None).expect("a tick");
+        let state: serde_json::Value = serde_json::from_str(&state).expect("right");
+        state["values"][0][1].as_f64()
+    };
+    assert_eq!(
+        [2, 3, 8, 13, 15].map(value),
+        [0.0, 0.0, 50.0, 100.0, 100.0].map(Some)
+    );
+    // Released on its way.
+    archive.note_faults(&[forced(1, Phase::Over, 1, 8)], 0);
+    assert_eq!(trend(0, 30).last(), Some(&(8_000_000, 0.0)));
+    archive.note_force(2, Way::Once.force(0, Slot::from_real(7.0), None));
+    archive.note_faults(&[forced(2, Phase::Over, 1, 16)], 0);
+    assert_eq!(
+        trend(14, 30),
+        [(14_000_000, 0.0), (15_000_000, 7.0), (16_000_000, 0.0)]
+    );
 }
 
 #[test]

@@ -25,7 +25,8 @@ fn oven() -> String {
 /// The rows as they are shown: names of signals, and heads with their numbers of signals.
 fn rows(browser: &Browser) -> serde_json::Value {
     browser.run(
-        "await new Promise(requestAnimationFrame); await new Promise(requestAnimationFrame); \
+        "document.getElementById('list').scrollIntoView(); \
+         await new Promise(requestAnimationFrame); await new Promise(requestAnimationFrame); \
          const top = (it) => it.getBoundingClientRect().top; \
          return Array.from(document.querySelectorAll('#window > .row')).filter((it) => !it.hidden).sort((a, b) => top(a) - top(b)) \
          .map((it) => it.dataset.kind === 'station' ? `${it.parts.name.textContent}: ${it.parts.facts.textContent.split(' ')[0]}` : it.parts.name.textContent)",
@@ -113,7 +114,7 @@ fn a_list_is_made_by_hand_saved_beside_the_driver_and_shared_by_its_link() {
     assert!(text.ends_with(right), "{text}");
     assert_eq!(browser.run("return location.hash"), "#list=Level%20control");
     assert_quiet(&browser);
-    // A viewer without the token opens the link, and changes only what he sees.
+    // A viewer without the token opens the link, and changes only this tab.
     let page = machine
         .url
         .split('#')

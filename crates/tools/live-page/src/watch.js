@@ -111,13 +111,18 @@ const watch = (() => {
     }
   }
 
+  /** A list with its keys in the order of `part`, so that two can be compared as texts. */
+  const ordered = ({ name, pins, group, order, formats }) => ({ name, pins, group, order, formats: Object.fromEntries(Object.entries(formats).sort(([a], [b]) => (a < b ? -1 : 1))) });
+
   /** Reads the files, and takes a list that others have changed if it was not changed here. */
   async function readFiles() {
     const before = changes;
     const drivers = plant.drivers.filter((driver) => driver.lists);
     const answers = await Promise.all(drivers.map(async ({ id }) => {
       const answer = await room.ask(`/lists/${id}`);
-      return answer.ok ? [[id, await answer.json()]] : [];
+      if (!answer.ok) return [];
+      const file = await answer.json();
+      return [[id, { ...file, lists: file.lists.map(ordered) }]];
     }));
     const now = new Map(answers.flat());
     if (changes !== before || isSame([...now], [...files])) return;

@@ -25,7 +25,7 @@ fn oven() -> String {
 /// The rows as they are shown: names of signals, and heads with their numbers of signals.
 fn rows(browser: &Browser) -> serde_json::Value {
     browser.run(
-        "document.getElementById('list').scrollIntoView(); \
+        "document.getElementById('list').scrollIntoView({ behavior: 'instant' }); \
          await new Promise(requestAnimationFrame); await new Promise(requestAnimationFrame); \
          const top = (it) => it.getBoundingClientRect().top; \
          return Array.from(document.querySelectorAll('#window > .row')).filter((it) => !it.hidden).sort((a, b) => top(a) - top(b)) \
@@ -237,9 +237,9 @@ fn signals_are_written_once_pulsed_ramped_and_forced_in_sets() {
     choose(&browser, "Level low");
     browser.wait("document.getElementById('force-way').value === 'hold' && document.getElementById('force-ramp').disabled");
     set(&browser, "force-way", "pulse");
-    set(&browser, "force-time", "300ms");
+    set(&browser, "force-time", "3s");
     click(&browser, "#force-true");
-    wait_said(&browser, "Level low is forced to TRUE for 300ms.");
+    wait_said(&browser, "Level low is forced to TRUE for 3s.");
     wait_shown(&browser, "Level low", "TRUE");
     wait_shown(&browser, "Level low", "FALSE");
     wait_marked(&browser, "Level low", "");

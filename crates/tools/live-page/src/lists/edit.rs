@@ -2,7 +2,7 @@
 
 use tickbus_base::toml_text::did_you_mean;
 use tickbus_image::signal::Signal;
-use toml_edit::{Array, ArrayOfTables, DocumentMut, Item, Table, Value, value};
+use toml_edit::{Array, ArrayOfTables, DocumentMut, Item, Table, Value};
 
 use super::file::Contents;
 use super::{List, Set};
@@ -48,17 +48,13 @@ impl Entry for List {
         put(table, "name", &self.name);
         put(table, "group", &self.group);
         put(table, "order", &self.order);
-        let mut pins = Array::new();
-        for pin in &self.pins {
-            let mut pin = Value::from(pin);
-            pin.decor_mut().set_prefix("\n    ");
-            pins.push_formatted(pin);
+        let written = table.get("pins").and_then(Item::as_array);
+        let written = written.map(|pins| pins.iter().map(Value::as_str).collect::<Vec<_>>());
+        let pins: Vec<Option<&str>> = self.pins.iter().map(|pin| Some(pin.as_str())).collect();
+        // Pins that are the same stay with their comments.
+        if written.as_ref() != Some(&pins) {
+            set(table, "pins", Value::from(lines(&self.pins)));
         }
-        if !pins.is_empty() {
-            pins.set_trailing("\n");
-            pins.set_trailing_comma(true);
-        }
-        table["pins"] = value(pins);
         keep_only(table, "formats", |name| self.formats.contains_key(name));
         for (signal, format) in &self.formats {
             put(sub_table(table, "formats"), signal, format);
@@ -114,6 +110,21 @@ impl Entry for Set {
             set(values, signal, new);
         }
     }
+}
+
+/// A list of texts, one a line.
+fn lines(texts: &[String]) -> Array {
+    let mut list = Array::new();
+    for text in texts {
+        let mut text = Value::from(text);
+        text.decor_mut().set_prefix("\n    ");
+        list.push_formatted(text);
+    }
+    if !list.is_empty() {
+        list.set_trailing("\n");
+        list.set_trailing_comma(true);
+    }
+    list
 }
 
 /// Puts a text, and leaves one that is the same as it is written.

@@ -146,6 +146,7 @@ impl Cell {
             let options = Options {
                 grace: None,
                 picture: None,
+                lists: None,
             };
             page.join(driver.watch(), options)
         });

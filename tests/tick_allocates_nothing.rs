@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
-use tickbus::driver::Driver;
+use tickbus::driver::{Driver, Force};
 use tickbus::driver_cfg::Config;
+use tickbus::faults::{Lasts, SignalEffect};
 use tickbus::signal::Slot;
 use tickbus::time::{Manual, Nanos};
 use tickbus_binding::Handles;
@@ -119,6 +120,21 @@ fn a_driver_that_is_watched_and_forced() {
                 if let Some(id) = before {
                     watch.end_fault(id).expect("it is taken");
                 }
+            } else if tick % 5 == 1 {
+                // Two at once: one for a tick, and one along a ramp.
+                let ramp = SignalEffect::Ramp {
+                    from: None,
+                    to: Slot::from_real(1.0),
+                    within: Nanos::from_millis(2),
+                };
+                let force = |signal, effect, ticks| Force {
+                    signal: signal % signals,
+                    effect,
+                    lasts: Lasts::Ticks(ticks),
+                };
+                let once = SignalEffect::Stuck(Some(Slot::from_real(1.0)));
+                let both = [force(tick, once, 1), force(tick + 1, ramp, 3)];
+                watch.force_all(&both, Vec::new()).expect("there is room");
             } else if tick % 500 == 7 {
                 // No signal is forced for a while.
                 if let Some(id) = forced.take() {

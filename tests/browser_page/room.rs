@@ -117,6 +117,7 @@ impl Fixture {
         let options = Options {
             grace: None,
             picture: None,
+            lists: None,
         };
         let member = live.join(driver.watch(), options);
         let pages = Pages::of("Live page", live.site());

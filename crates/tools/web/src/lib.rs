@@ -1,8 +1,9 @@
 //! The web room, which serves live pages.
 //!
 //! A [`Site`] provides the files of a page, its state while there are viewers, and carries out changes. [`Pages`] are
-//! the sites of one room. The [`Room`] does the rest: one thread, a token without which nothing can be changed, the refusal of requests from other sites,
-//! limits, and server-sent events that give every viewer the newest state: all of it, or just the differences.
+//! the sites of one room. The [`Room`] does the rest: one thread, a token without which nothing can be changed, the refusal
+//! of requests from other sites, limits, and server-sent events that give every viewer the newest state: all of it, or just
+//! the differences.
 //!
 //! The room uses hyper, not the framework axum on top of it: axum's own server limits neither the time for headers nor
 //! the number of connections, and a page has so few paths that a `match` suffices as their router.
@@ -18,6 +19,7 @@ mod room;
 mod seats;
 mod serve;
 mod site;
+mod slim;
 mod token;
 
 pub use invitation::Invitation;
@@ -26,6 +28,7 @@ pub use room::{Limits, Room, Serving};
 pub use site::{
     Answer, Asset, Change, Differences, Document, Outcome, Refused, Site, State, Tab, Verb,
 };
+pub use slim::slim;
 
 /// The shared parts of every page's scripts: the token, requests, events.
 pub const CLIENT: &str = include_str!("client.js");

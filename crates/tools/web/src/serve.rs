@@ -22,6 +22,7 @@ use crate::feeds::Feeds;
 use crate::guard::{Guard, Token};
 use crate::pages::Pages;
 use crate::site::{Answer, Change, Verb};
+use crate::slim::slim;
 
 /// Only the page and its own files; nothing from other hosts, nothing inline, not within a frame.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data:; \
@@ -182,7 +183,7 @@ async fn get(
         )),
         _ => {
             if let Some(asset) = hall.pages.asset(path) {
-                return Ok(full(asset.kind, asset.text));
+                return Ok(full(asset.kind, slim(&asset)));
             }
             if let Some(other) = hall.pages.instead_of_first().filter(|_| path == "/") {
                 return Ok(see_other(&other));

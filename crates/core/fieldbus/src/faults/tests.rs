@@ -101,6 +101,63 @@ impl End {
 fn nothing(_: &mut [Slot]) {}
 
 #[test]
+fn a_ramp_goes_evenly_to_its_end_whatever_the_type() {
+    let ramp = |index, from, to| Fault {
+        name: "ramp".to_owned(),
+        effect: Effect::Signal(
+            index,
+            SignalEffect::Ramp {
+                from,
+                to,
+                within: Nanos::from_millis(40),
+            },
+        ),
+        begin: Begin::AtOnce,
+        lasts: Lasts::UntilEnded,
+        times: 1,
+        seed: 1,
+    };
+    let mut end = End::new();
+    let edges = [None, None, Some(SIGNALS), None, None];
+    let table = table();
+    let slots = Slots {
+        table: &table,
+        writes: Area::Input,
+        edges: &edges,
+    };
+    let real = Slot::from_real;
+    let whole = Slot::from_signed;
+    for fault in [
+        // From the value that the simulation has, in its unit.
+        ramp(1, None, real(60.0)),
+        // Digits that a double does not have.
+        ramp(3, Some(whole(i64::MAX - 8)), whole(i64::MAX)),
+        ramp(4, Some(real(10.0)), real(3.0)),
+    ] {
+        let what = fault.what(&table);
+        let id = end.faults.add(&fault, slots).expect("there is room");
+        assert_eq!(end.board.ramp_value(id), None, "{what}");
+    }
+    end.set(1, 100.0);
+    let seen = [(); 6].map(|()| {
+        // What the simulation writes meanwhile changes nothing.
+        let sent = end.tick(nothing)[1];
+        end.set(1, 7.0);
+        (sent, i64::MAX - end.slots[3].signed(), end.slots[4].real())
+    });
+    let right = [
+        (100.0, 8, 10.0),
+        (90.0, 6, 8.0),
+        (80.0, 4, 7.0),
+        (70.0, 2, 5.0),
+        (60.0, 0, 3.0),
+        (60.0, 0, 3.0),
+    ];
+    assert_eq!(seen, right);
+    assert_eq!(end.board.ramp_value(1), Some(real(60.0)));
+}
+
+#[test]
 fn values_are_changed_only_while_a_fault_of_a_signal_is_active() {
     for (kind, is_of_signal) in [("invert\"\nsignal = \"run", true), ("link-down", false)] {
         let mut end = End::new();

@@ -99,7 +99,7 @@ fn decoded(text: &str) -> Option<String> {
     Some(url)
 }
 
-/// What the page answers at its port to a phone that has opened this URL.
+/// The answer of the page at its port to a phone that has opened this URL.
 fn opened(url: &str) -> (String, String) {
     let (address, token) = url
         .strip_prefix("http://")

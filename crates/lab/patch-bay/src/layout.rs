@@ -29,7 +29,7 @@ const NAMED_WIDTH: i32 = 352;
 const HEADER: i32 = 44;
 const PADDING: i32 = 10;
 
-/// What the size of a box depends on.
+/// The properties of a box that decide its size.
 #[derive(Debug, Default)]
 pub(crate) struct BoxShape {
     pub(crate) name: String,

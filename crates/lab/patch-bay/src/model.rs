@@ -45,7 +45,7 @@ pub(crate) struct Model {
     floor: u64,
     pub(crate) clients: Vec<Shown>,
     pub(crate) cables: BTreeMap<Pin, Cable>,
-    /// What has gone, and when.
+    /// The things that have gone, and when.
     pub(crate) gone: VecDeque<(u64, Gone)>,
     pub(crate) layout: Layout,
 }

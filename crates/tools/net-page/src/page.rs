@@ -29,7 +29,7 @@ pub struct Nets {
     id: u64,
 }
 
-/// Whether a state is wanted.
+/// True if a state is wanted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wanted {
     /// Nobody looks, or the last state is too young.
@@ -40,7 +40,7 @@ pub enum Wanted {
     Over,
 }
 
-/// What the page and its programs share.
+/// The data that the page and its programs share.
 pub(crate) struct Hall {
     clock: Arc<dyn Clock>,
     /// Distinguishes this page from that of a process before it at the same address.

@@ -25,7 +25,7 @@ struct NetState {
     scans: u64,
     /// The time of the last scan, in microseconds.
     us: Option<i64>,
-    /// What holds for all nets of one scan, such as that the line is stale.
+    /// A note that holds for all nets of one scan, such as that the line is stale.
     #[serde(default)]
     note: String,
     /// Why the net has stopped; empty while it runs.

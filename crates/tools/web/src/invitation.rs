@@ -82,7 +82,7 @@ impl Invitation {
         self
     }
 
-    /// What a terminal shows below the address: the other addresses, and a QR code of the best one. For a page that only
+    /// The lines that a terminal shows below the address: the other addresses, and a QR code of the best one. For a page that only
     /// this computer opens, one line, once in a process. Not for logs, since it has the token.
     pub fn for_terminal(&self) -> String {
         static IS_TOLD: AtomicBool = AtomicBool::new(false);

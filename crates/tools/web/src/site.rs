@@ -66,7 +66,7 @@ pub struct Asset {
 pub struct Tab {
     /// The name, such as "Signals".
     pub name: String,
-    /// What follows the path of the page, such as `#signals`; empty for the page itself.
+    /// The part of the address behind the path of the page, such as `#signals`; empty for the page itself.
     pub fragment: String,
 }
 

@@ -28,7 +28,7 @@ const FORMATS: [(&str, &str); 4] = [
 /// The remedy where a name should be.
 const NAME: &str = "name it, such as name = \"Level control\"";
 
-/// What was read.
+/// The content of the file.
 #[derive(Debug, Default)]
 pub(super) struct Contents {
     pub(super) lists: Vec<List>,

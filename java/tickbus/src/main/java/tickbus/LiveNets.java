@@ -64,7 +64,7 @@ public final class LiveNets implements AutoCloseable {
     }
 
     /**
-     * Whether a state is wanted: somebody looks, and the last state is 33 ms old. Otherwise waits for that.
+     * Returns true if a state is wanted: somebody looks, and the last state is 33 ms old. Otherwise waits for that.
      *
      * @param patienceNanos waits at most this long; with 0 it never waits
      * @return false if it was in vain

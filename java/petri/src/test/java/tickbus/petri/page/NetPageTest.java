@@ -30,7 +30,7 @@ import tickbus.petri.run.NetWatch;
 import tickbus.petri.run.RunningNet;
 import tickbus.petri.run.Stepper;
 
-/** What the page itself does is tested in crates/tools/net-page and crates/tools/web. */
+/** The tests of the page itself are in crates/tools/net-page and crates/tools/web. */
 @Tag("native")
 @Timeout(120)
 class NetPageTest {

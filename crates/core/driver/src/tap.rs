@@ -47,6 +47,10 @@ struct Batch {
 
 /// Memory that only the other thread can free.
 #[derive(Debug)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "a box would have to be allocated by the tick"
+)]
 enum Waste {
     Fault(#[expect(dead_code, reason = "kept for its drop")] Retired),
     Batch(#[expect(dead_code, reason = "kept for its drop")] Box<Batch>),

@@ -367,7 +367,10 @@ impl Exhibit for Shown {
             way.force(*index, *value, from)
         });
         let forces: Vec<_> = forces.collect();
-        let faults = self.watch.force_all(&forces, ends).map_err(conflict)?;
+        let faults = self
+            .watch
+            .force_all(&forces, ends)
+            .map_err(|mistake| conflict(&mistake))?;
         for (fault, (force, (index, (value, way)))) in
             faults.into_iter().zip(forces.iter().zip(wanted))
         {
@@ -389,7 +392,9 @@ impl Exhibit for Shown {
         if ends.is_empty() {
             return Ok(());
         }
-        self.watch.force_all(&[], ends).map_err(conflict)?;
+        self.watch
+            .force_all(&[], ends)
+            .map_err(|mistake| conflict(&mistake))?;
         for index in places {
             self.forced.remove(&index);
         }
@@ -434,7 +439,7 @@ impl Exhibit for Shown {
         };
         self.forced.retain(|_, force| remains(force.fault));
         self.faults.retain(|_, fault| remains(*fault));
-        refused.map_or(Ok(()), |mistake| Err(conflict(mistake)))
+        refused.map_or(Ok(()), |mistake| Err(conflict(&mistake)))
     }
 
     fn look_at_forced(&mut self) {
@@ -452,7 +457,7 @@ impl Exhibit for Shown {
 }
 
 /// The simulation does not take it over.
-fn conflict(mistake: Mistake) -> Refused {
+fn conflict(mistake: &Mistake) -> Refused {
     Refused {
         status: 409,
         text: mistake.to_string(),

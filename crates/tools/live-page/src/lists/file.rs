@@ -84,6 +84,7 @@ fn name(table: &mut Table<'_>, earlier: &[&str]) -> Option<String> {
 }
 
 fn list(mut table: Table<'_>, earlier: &[&str], places: &mut Places) -> Option<List> {
+    const RIGHT: &str = "write [list.formats], with lines such as \"Status\" = \"hex\"";
     const PINS: &str = "write the names of signals, such as [\"Level\", \"Valve\"]";
     let name = name(&mut table, earlier);
     let owner = format!("the list \"{}\"", name.as_deref().unwrap_or_default());
@@ -110,7 +111,6 @@ fn list(mut table: Table<'_>, earlier: &[&str], places: &mut Places) -> Option<L
     let group = choice(table.take("group"), "groups", &GROUPS);
     let order = choice(table.take("order"), "orders", &ORDERS);
     let mut formats = BTreeMap::new();
-    const RIGHT: &str = "write [list.formats], with lines such as \"Status\" = \"hex\"";
     let given = table.take("formats");
     let given = given.and_then(|value| value.table("[list.formats]", RIGHT));
     for (signal, value) in given.iter().flat_map(Table::all) {

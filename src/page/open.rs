@@ -228,8 +228,12 @@ pub(crate) struct NetsPlace {
     nets: Nets,
     url: String,
     /// `None` after the nets have left.
-    held: Mutex<Option<(Arc<Tab<NetPage>>, Arc<Open>)>>,
+    held: Mutex<Option<HeldNets>>,
 }
+
+/// The page that a program's nets are on, and the room that serves it.
+#[cfg(feature = "doors")]
+type HeldNets = (Arc<Tab<NetPage>>, Arc<Open>);
 
 /// Shows nets on a page, which is served at `listen` unless this process has pages already.
 #[cfg(feature = "doors")]

@@ -255,6 +255,12 @@ fn wait_marked(browser: &Browser, name: &str, mark: &str) {
 
 /// Clicks on the row of a signal.
 fn choose(browser: &Browser, name: &str) {
+    // Only rows that are in view are in the document.
+    browser.run(&format!(
+        "list.find(plant.signals.find((signal) => signal.name === {}))",
+        json!(name)
+    ));
+    browser.wait(&row(name));
     browser.run(&format!("{}.parts.name.click()", row(name)));
     browser.wait(&format!(
         "document.getElementById('chosen-name').textContent === {}",

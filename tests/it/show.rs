@@ -121,7 +121,7 @@ fn a_recording_is_a_page_with_every_moment_until_it_is_interrupted() {
     }
 }
 
-/// Files as Icarus Verilog 11.0 and PyVCD 0.5 have written them.
+/// Files as Icarus Verilog 11.0 and `PyVCD` 0.5 have written them.
 #[test]
 fn vcd_of_other_programs_is_a_page_as_well() {
     let folder = super::testing::repository().join("tests/it/vcd");

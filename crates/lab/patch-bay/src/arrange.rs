@@ -295,6 +295,15 @@ pub(crate) struct Placed {
 }
 
 impl Placed {
+    /// True if the boxes overlap.
+    pub(crate) fn covers(&self, other: &Self) -> bool {
+        let (one, two) = (self.spot, other.spot);
+        one.x < two.x + other.size.width
+            && two.x < one.x + self.size.width
+            && one.y < two.y + other.size.height
+            && two.y < one.y + self.size.height
+    }
+
     /// True if the boxes overlap, or have less than the usual space between them.
     pub(crate) fn is_near(&self, other: &Self) -> bool {
         let (one, two) = (self.spot, other.spot);
@@ -314,8 +323,9 @@ pub(crate) fn beside(size: Size, sources: &[Placed], sinks: &[Placed], all: &[Pl
     let left = sinks.iter().map(|it| it.spot.x - size.width - BESIDE).min();
     let x = right.or(left).unwrap_or_default().max(0);
     let near: Vec<i32> = sources.iter().chain(sinks).map(|it| it.spot.y).collect();
-    let count = i32::try_from(near.len()).unwrap_or(1).max(1);
-    let y = near.iter().sum::<i32>() / count;
+    let count = i64::try_from(near.len()).unwrap_or(1).max(1);
+    let sum = near.iter().map(|y| i64::from(*y)).sum::<i64>();
+    let y = i32::try_from(sum / count).unwrap_or_default();
     // Beside or beneath a box is free space, if anywhere.
     let xs = all.iter().map(|it| it.spot.x + it.size.width + BESIDE);
     let xs: BTreeSet<i32> = xs

@@ -6,20 +6,28 @@ const changes = (() => {
   const PATIENCE = 1500;
   const LONGEST = 200;
   let say = () => {};
-  let done = [];
-  let undone = [];
-  let isBusy = false;
+  const LOST = 'The dispatcher does not answer; check the change when it is back.';
+  const done = [];
+  const undone = [];
+  let running = Promise.resolve();
 
-  /** Sends one request; returns whether it was carried out. */
+  /** Changes are made one after the other, so that Undo knows the last one. */
+  function queue(work) {
+    running = running.catch(() => {}).then(work);
+    return running;
+  }
+
+  /** Sends one request; returns why it was not carried out, or null. */
   async function send(method, path, body) {
     const said = await room.change(method, room.base + path, body);
-    if (said === null) say('The dispatcher does not answer; check the change when it is back.', true);
-    else if (!said.ok) say(`ERR ${said.code} ${said.text}`, true);
-    return said?.ok === true;
+    if (said === null) return LOST;
+    return said.ok ? null : `ERR ${said.code} ${said.text}`;
   }
 
   // A step is a list of facts: { kind, name, before, after }. The kinds are "cable", by inputs; "force", by channels; "place",
   // by clients.
+
+  const KEYS = ['x', 'y', 'folded', 'group'];
 
   function now({ kind, name }) {
     if (kind === 'cable') return lab.cables.get(name)?.output ?? null;
@@ -30,14 +38,20 @@ const changes = (() => {
   function isSame(kind, one, other) {
     if (one === null || other === null || kind === 'cable') return one === other;
     if (kind === 'force') return Number(one) === Number(other);
-    return ['x', 'y', 'folded', 'group'].every((key) => one[key] === other[key]);
+    return KEYS.every((key) => one[key] === other[key]);
+  }
+
+  /** The part of a place that a fact changes, as it is on one side. */
+  function part({ before, after }, wanted) {
+    return Object.fromEntries(KEYS.filter((key) => before?.[key] !== after?.[key]).map((key) => [key, wanted?.[key] ?? null]));
   }
 
   /** A sentence about the first fact that somebody else has changed; undefined if all are as they should be. */
   function foreign(facts, side) {
     for (const fact of facts) {
       const present = now(fact);
-      if (isSame(fact.kind, present, fact[side])) continue;
+      const isPlace = fact.kind === 'place' && present;
+      if (isPlace ? isSame('place', part(fact, present), part(fact, fact[side])) : isSame(fact.kind, present, fact[side])) continue;
       if (fact.kind === 'cable') return `${fact.name} is ${present ? `connected with ${present}` : 'not connected'} now`;
       if (fact.kind === 'force') return `${fact.name} is ${present === null ? 'not forced' : `forced to ${present}`} now`;
       return `the box ${fact.name} is elsewhere now`;
@@ -45,87 +59,113 @@ const changes = (() => {
     return undefined;
   }
 
+  /** Makes facts; returns the made ones, and why another one was not made. */
   async function make(facts, side) {
-    const places = {};
+    const made = [];
+    const moved = [];
+    const places = Object.create(null);
+    let why = null;
     for (const fact of facts) {
       const { kind, name } = fact;
       const wanted = fact[side];
+      if (kind === 'place') {
+        places[name] = part(fact, wanted);
+        moved.push(fact);
+        continue;
+      }
       const path = `/${kind === 'cable' ? 'patch' : 'force'}/${name}`;
-      if (kind === 'place') places[name] = wanted;
-      else if (!await (wanted === null ? send('DELETE', path) : send('PUT', path, wanted))) return false;
+      const refusal = await (wanted === null ? send('DELETE', path) : send('PUT', path, wanted));
+      if (refusal === null) made.push(fact);
+      why ??= refusal;
     }
-    return !Object.keys(places).length || send('PUT', '/layout', JSON.stringify(places));
+    if (moved.length) {
+      const refusal = await send('PUT', '/layout', JSON.stringify(places));
+      why ??= refusal;
+      if (refusal === null) {
+        made.push(...moved);
+        // The next change begins here, even if the event with these places comes later.
+        for (const [name, place] of Object.entries(places)) lab.places.set(name, { ...lab.places.get(name), ...place });
+      }
+    }
+    return { made, why };
+  }
+
+  /** Tells what was done, and what was not. */
+  function report(text, made, why) {
+    if (why === null) say(text);
+    else say(made.length ? `${text.replace(/\.$/, '')}, but ${why}` : why, true);
   }
 
   function remember(text, facts) {
     if (!facts.length) return;
     done.push({ text, facts });
-    done = done.slice(-LONGEST);
-    undone = [];
+    if (done.length > LONGEST) done.shift();
+    undone.length = 0;
   }
 
   /** Makes a step, and keeps it. Facts without `before` have the present one. */
-  async function step(text, facts) {
+  async function carryOut(text, facts) {
     for (const fact of facts) fact.before ??= now(fact);
-    const isMade = await make(facts, 'after');
-    if (isMade) {
-      remember(text, facts);
-      say(text);
-    }
-    return isMade;
+    const { made, why } = await make(facts, 'after');
+    remember(text, made);
+    report(text, made, why);
+    return why === null;
   }
+  const step = (text, facts) => queue(() => carryOut(text, facts));
 
   /** Undoes or repeats the last step, unless somebody else has changed the same meanwhile. */
-  async function turn(from, to, [here, there], word) {
-    if (isBusy) return;
-    const last = from.at(-1);
+  const turn = (from, to, [here, there], word) => queue(async () => {
+    const last = from.pop();
     if (!last) {
       say(`Nothing to ${word}.`);
       return;
     }
-    isBusy = true;
     const end = performance.now() + PATIENCE;
-    let why = foreign(last.facts, here);
+    let other = foreign(last.facts, here);
     // The state after the last change may still be on its way.
-    while (why && performance.now() < end) {
+    while (other && performance.now() < end) {
       await lab.next(100);
-      why = foreign(last.facts, here);
+      other = foreign(last.facts, here);
     }
-    const facts = word === 'undo' ? last.facts.slice().reverse() : last.facts;
-    if (why) {
-      say(`Cannot ${word} "${last.text.replace(/\.$/, '')}": ${why}, because somebody else has changed it. Nothing was changed.`, true);
-      from.pop();
-    } else if (await make(facts, there)) {
-      from.pop();
-      to.push(last);
-      say(`${word === 'undo' ? 'Undone' : 'Repeated'}: ${last.text}`);
+    if (other) {
+      say(`Cannot ${word} "${last.text.replace(/\.$/, '')}": ${other}, because somebody else has changed it. Nothing was changed.`, true);
+      return;
     }
-    isBusy = false;
-  }
+    const { made, why } = await make(word === 'undo' ? last.facts.slice().reverse() : last.facts, there);
+    if (made.length) to.push({ text: last.text, facts: last.facts.filter((fact) => made.includes(fact)) });
+    else if (why === LOST) from.push(last);
+    report(`${word === 'undo' ? 'Undone' : 'Repeated'}: ${last.text}`, made, why);
+  });
 
   const connect = (input, output) => step(`Connected ${output} with ${input}.`, [{ kind: 'cable', name: input, before: null, after: output }]);
 
   /** Cuts cables, all of one channel or a single one. */
-  async function cut(cables, path, text) {
+  const cut = (cables, path, text) => queue(async () => {
     const facts = cables.map(({ input, output }) => ({ kind: 'cable', name: input, before: output, after: null }));
-    if (!await send('DELETE', `/patch/${path}`)) return false;
-    remember(text, facts);
-    say(text);
-    return true;
-  }
+    const why = await send('DELETE', `/patch/${path}`);
+    if (why === null) remember(text, facts);
+    report(text, [], why);
+  });
 
   const force = (name, value) => step(`${name} is forced to ${value}.`, [{ kind: 'force', name, after: value }]);
   const release = (name) => step(`${name} is released.`, [{ kind: 'force', name, after: null }]);
 
   /** Gives boxes other places: [name, { x, y, folded, group }], each with what changes. */
-  function place(text, list) {
-    const facts = list.map(([name, wanted]) => ({ kind: 'place', name, after: { ...lab.places.get(name), ...wanted } }));
-    return step(text, facts.filter(({ name, after }) => !isSame('place', lab.places.get(name) ?? null, after)));
-  }
+  const place = (text, list) => queue(() => {
+    const facts = list.map(([name, wanted]) => {
+      const before = lab.places.get(name) ?? null;
+      return { kind: 'place', name, before, after: { ...before, ...wanted } };
+    });
+    return carryOut(text, facts.filter(({ before, after }) => !isSame('place', before, after)));
+  });
 
-  async function arrange() {
+  const arrange = () => queue(async () => {
     const before = new Map(lab.places);
-    if (!await send('PUT', '/layout/arranged')) return;
+    const why = await send('PUT', '/layout/arranged');
+    if (why !== null) {
+      say(why, true);
+      return;
+    }
     await lab.next(PATIENCE);
     const facts = [];
     for (const [name, after] of lab.places) {
@@ -134,7 +174,7 @@ const changes = (() => {
     }
     remember('Arranged all boxes.', facts);
     say('Arranged all boxes.');
-  }
+  });
 
   return {
     connect, cut, force, release, place, arrange,

@@ -15,16 +15,21 @@ const layout = (() => {
   let timer = null;
 
   const titleOf = (node) => node?.closest?.('.title')?.closest('.client').dataset.name;
-  const onGrid = (number) => Math.max(0, Math.round(number / GRID) * GRID);
+  const onGrid = (number) => Math.round(number / GRID) * GRID;
 
   /** The boxes that move together with one: the chosen ones, if it is among them. */
   const together = (name) => (chosen.has(name) ? [...chosen] : [name]).filter((it) => lab.places.has(it));
 
-  function move(names, dx, dy) {
-    for (const name of names) {
-      const { x, y } = lab.places.get(name);
-      board.dragged.set(name, { x: onGrid(x + dx), y: onGrid(y + dy) });
-    }
+  /** Moves boxes together: at an edge all of them stop, and their distances stay. */
+  function move(names, dx, dy, from = (name) => lab.places.get(name)) {
+    const all = names.filter((name) => lab.places.has(name)).map((name) => [name, from(name)]);
+    if (!all.length) return;
+    const by = (key, wanted) => {
+      const first = all[0][1][key];
+      return Math.max(onGrid(first + wanted) - first, -Math.min(...all.map(([, place]) => place[key])));
+    };
+    const [right, down] = [by('x', dx), by('y', dy)];
+    for (const [name, { x, y }] of all) board.dragged.set(name, { x: x + right, y: y + down });
     board.place();
   }
 
@@ -84,7 +89,7 @@ const layout = (() => {
   function begin(event, names) {
     wasDragged = false;
     if (!mayChange() || board.narrow.matches || event.button !== 0 || !names.length) return;
-    held = { names, pointer: event.pointerId, x: event.clientX, y: event.clientY, left: get('board').scrollLeft };
+    held = { names, pointer: event.pointerId, x: event.pageX, y: event.pageY, left: get('board').scrollLeft };
   }
   board.clients.addEventListener('pointerdown', (event) => {
     const name = titleOf(event.target) ?? event.target.closest?.('.client > header')?.parentNode.dataset.name;
@@ -100,7 +105,7 @@ const layout = (() => {
       end();
       return;
     }
-    const [dx, dy] = [event.clientX - held.x, event.clientY - held.y];
+    const [dx, dy] = [event.pageX - held.x, event.pageY - held.y];
     if (!wasDragged && Math.hypot(dx, dy) < 6) return;
     wasDragged = true;
     move(held.names, dx + get('board').scrollLeft - held.left, dy);
@@ -139,11 +144,7 @@ const layout = (() => {
     const arrow = ARROWS[event.key];
     if (arrow && mayChange() && !board.narrow.matches) {
       const step = GRID * (event.shiftKey ? 4 : 1);
-      for (const it of together(name)) {
-        const { x, y } = board.dragged.get(it) ?? lab.places.get(it);
-        board.dragged.set(it, { x: onGrid(x + arrow[0] * step), y: onGrid(y + arrow[1] * step) });
-      }
-      board.place();
+      move(together(name), arrow[0] * step, arrow[1] * step, (it) => board.dragged.get(it) ?? lab.places.get(it));
       clearTimeout(timer);
       timer = setTimeout(keep, REST);
       event.preventDefault();
@@ -181,6 +182,8 @@ const layout = (() => {
 
   return {
     reveal, letGo, showChosen,
+    /** Keeps what arrow keys have moved, without waiting for a further key. */
+    flush() { if (timer !== null) keep(); },
     listen(may, tell) {
       mayChange = may;
       say = tell;

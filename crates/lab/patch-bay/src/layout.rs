@@ -1,6 +1,6 @@
 //! Where the boxes of clients are: moved, folded, grouped, and kept.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fmt::Write as _;
 
 use serde_json::Value;
@@ -84,6 +84,8 @@ impl BoxShape {
 #[derive(Debug, Default)]
 pub(crate) struct Layout {
     pub(crate) places: BTreeMap<String, Place>,
+    /// The boxes that were there when boxes were last placed.
+    here: HashSet<String>,
     file: Option<LayoutFile>,
 }
 
@@ -92,6 +94,7 @@ impl Layout {
         Self {
             places,
             file: Some(file),
+            ..Self::default()
         }
     }
 
@@ -104,8 +107,14 @@ impl Layout {
         number: u64,
     ) -> bool {
         let is_folded = boxes.len() > OPEN;
+        let covering = self.covering(boxes);
+        self.here = boxes.iter().map(|shape| shape.name.clone()).collect();
         for shape in boxes {
-            if let Some(place) = self.places.get_mut(&shape.name) {
+            if covering.contains(&*shape.name) {
+                self.put(&shape.name, number, |place| {
+                    place.settles = Some(now + SETTLING);
+                });
+            } else if let Some(place) = self.places.get_mut(&shape.name) {
                 place.settles = place.settles.filter(|until| now < *until);
             } else {
                 let mut place = Place::kept(Spot { x: 0, y: 0 }, is_folded, None);
@@ -129,11 +138,35 @@ impl Layout {
         };
         let mut is_changed = false;
         for (shape, spot) in boxes.iter().zip(spots) {
-            is_changed |= self.put(&shape.name, number, |place| place.spot = spot);
+            is_changed |= self.put(&shape.name, number, |place| place.spot = within(spot));
         }
         self.forget(boxes);
         self.save();
         is_changed
+    }
+
+    /// The boxes that come back to a place that another one has got meanwhile. Only the headers count: an unfolded box may
+    /// cover those below it.
+    fn covering(&self, boxes: &[BoxShape]) -> HashSet<String> {
+        let header = |shape: &BoxShape| {
+            let place = self.places.get(&shape.name)?;
+            let (spot, size) = (place.spot, shape.size(true));
+            Some(Placed { spot, size })
+        };
+        let (stayed, come): (Vec<_>, Vec<_>) = boxes
+            .iter()
+            .partition(|shape| self.here.contains(&shape.name));
+        let mut taken: Vec<Placed> = stayed.into_iter().filter_map(header).collect();
+        let mut covering = HashSet::new();
+        for shape in come {
+            let Some(own) = header(shape) else { continue };
+            if taken.iter().any(|other| other.covers(&own)) {
+                covering.insert(shape.name.clone());
+            } else {
+                taken.push(own);
+            }
+        }
+        covering
     }
 
     /// The places of all boxes, where some have theirs already.
@@ -198,7 +231,7 @@ impl Layout {
     pub(crate) fn arrange(&mut self, boxes: &[BoxShape], links: &[(usize, usize)], number: u64) {
         let spots = arrange(&self.sizes(boxes), links);
         for (shape, spot) in boxes.iter().zip(spots) {
-            self.put(&shape.name, number, |place| place.spot = spot);
+            self.put(&shape.name, number, |place| place.spot = within(spot));
         }
         self.pin();
         self.save();
@@ -285,8 +318,7 @@ impl Layout {
         if surplus == 0 {
             return;
         }
-        let here: std::collections::HashSet<&str> =
-            boxes.iter().map(|shape| &*shape.name).collect();
+        let here: HashSet<&str> = boxes.iter().map(|shape| &*shape.name).collect();
         let absent = self
             .places
             .keys()
@@ -320,6 +352,15 @@ impl Layout {
             text.push_str(" }\n");
         }
         text
+    }
+}
+
+/// A spot that the file accepts.
+fn within(Spot { x, y }: Spot) -> Spot {
+    let within = |at: i32| at.clamp(0, FARTHEST);
+    Spot {
+        x: within(x),
+        y: within(y),
     }
 }
 
@@ -379,6 +420,48 @@ mod tests {
         let many: Vec<BoxShape> = (0..100).map(|at| shape(&format!("C{at}"))).collect();
         layout.settle(&many, &[(0, 1)], second(20), 8);
         assert!(layout.places["C99"].is_folded && !layout.places["LAMP"].is_folded);
+    }
+
+    #[test]
+    fn a_box_that_returns_to_a_taken_place_gets_a_free_one() {
+        let second = |seconds: i64| Nanos(seconds * 1_000_000_000);
+        let mut layout = Layout::default();
+        let all = || vec![shape("LOGO"), shape("PUMP"), shape("FAN")];
+        layout.settle(&all(), &[], second(0), 1);
+        layout
+            .change(r#"{"LOGO":{"x":700,"y":90},"PUMP":{"x":0,"y":500}}"#, 2)
+            .expect("right");
+        let away = || vec![shape("LOGO"), shape("FAN")];
+        layout.settle(&away(), &[], second(10), 3);
+        // A box that returns to a free place stays there.
+        assert!(!layout.settle(&all(), &[], second(20), 4));
+        assert_eq!(spot(&layout, "PUMP"), (0, 500));
+        layout.settle(&away(), &[], second(30), 5);
+        layout
+            .change(r#"{"LOGO":{"x":10,"y":480}}"#, 6)
+            .expect("right");
+        assert!(layout.settle(&all(), &[], second(40), 7));
+        assert_eq!(spot(&layout, "LOGO"), (10, 480), "it has stayed");
+        let (x, y) = spot(&layout, "PUMP");
+        assert!(
+            !(0..=218).contains(&x) || !(436..=524).contains(&y),
+            "{x} {y}"
+        );
+        assert_eq!(layout.places["PUMP"].changed, 7);
+    }
+
+    #[test]
+    fn a_place_beyond_the_last_one_is_never_kept() {
+        let mut layout = Layout::default();
+        let mut boxes = vec![shape("A")];
+        layout.settle(&boxes, &[], Nanos(0), 1);
+        layout
+            .change(r#"{"A":{"x":1000000,"y":1000000}}"#, 2)
+            .expect("right");
+        boxes.push(shape("B"));
+        layout.settle(&boxes, &[(0, 1)], Nanos(9_000_000_000), 3);
+        let (x, y) = spot(&layout, "B");
+        assert!(x <= FARTHEST && y <= FARTHEST, "{x} {y}");
     }
 
     #[test]

@@ -12,6 +12,8 @@ mod place;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::mpsc::channel;
+use std::thread;
 
 use tickbus_base::toml_text::Mistakes;
 use tickbus_dispatcher::{Door, Number, Order, Pin, Reply};
@@ -139,32 +141,61 @@ impl PatchBay {
 
     /// The file of the layout beside that of the patch: `patch.layout.toml` beside `patch.toml`.
     pub fn layout_beside(patch: &Path) -> PathBuf {
-        patch.with_extension("layout.toml")
+        if patch.extension().is_some_and(|it| it == "toml") {
+            return patch.with_extension("layout.toml");
+        }
+        // `hall.1` and `hall.2` have a layout each.
+        let mut path = patch.as_os_str().to_owned();
+        path.push(".layout.toml");
+        path.into()
     }
 
-    fn change_layout(&self, verb: Verb, path: &str, body: &str) -> Outcome {
-        let refuse = |status, text: String| Err(Refused { status, text });
-        self.model.with(|model| {
-            let number = model.number + 1;
-            match (verb, path) {
-                (Verb::Put, "/layout") => {
-                    if let Err(text) = model.layout.change(body, number) {
-                        return refuse(400, text);
-                    }
-                }
-                (Verb::Put, "/layout/arranged") => {
-                    let (boxes, links) = model.boxes();
-                    model.layout.arrange(&boxes, &links, number);
-                }
-                _ => {
-                    let text = "change a layout with PUT /layout and PUT /layout/arranged";
-                    return refuse(404, text.to_owned());
+    /// Changes the layout of the present board. Nobody may look at it, so that the dispatcher is asked for it first. Its
+    /// thread must not wait for a model that is being formatted: a thread of the change does.
+    fn request_layout(&self, change: Change, answer: Answer<Outcome>) {
+        let (sender, taken) = channel();
+        let model = Arc::clone(&self.model);
+        self.door.send(move |dispatcher, now| {
+            model.leave(dispatcher.snapshot(), now);
+            // The thread ends only with this answer.
+            let _ = sender.send(());
+        });
+        let model = Arc::clone(&self.model);
+        let thread = thread::Builder::new().name("layout-change".to_owned());
+        let started = thread.spawn(move || {
+            // Without the dispatcher the answer is dropped, which tells that it has ended.
+            if taken.recv().is_ok() {
+                answer.give(change_layout(&model, &change));
+            }
+        });
+        // The answer is dropped without a thread, too.
+        drop(started);
+    }
+}
+
+fn change_layout(model: &Shared, change: &Change) -> Outcome {
+    let refuse = |status, text: String| Err(Refused { status, text });
+    model.with(|model| {
+        model.layout.pin();
+        let number = model.number + 1;
+        match (change.verb, &*change.path) {
+            (Verb::Put, "/layout") => {
+                if let Err(text) = model.layout.change(&change.body, number) {
+                    return refuse(400, text);
                 }
             }
-            model.number = number;
-            Ok(())
-        })
-    }
+            (Verb::Put, "/layout/arranged") => {
+                let (boxes, links) = model.boxes();
+                model.layout.arrange(&boxes, &links, number);
+            }
+            _ => {
+                let text = "change a layout with PUT /layout and PUT /layout/arranged";
+                return refuse(404, text.to_owned());
+            }
+        }
+        model.number = number;
+        Ok(())
+    })
 }
 
 impl Site for PatchBay {
@@ -189,11 +220,11 @@ impl Site for PatchBay {
     }
 
     fn change(&self, change: Change, answer: Answer<Outcome>) {
+        if change.path.starts_with("/layout") {
+            return self.request_layout(change, answer);
+        }
         // Boxes must not move under the pointer of somebody who works with them.
         self.model.with(|model| model.layout.pin());
-        if change.path.starts_with("/layout") {
-            return answer.give(self.change_layout(change.verb, &change.path, &change.body));
-        }
         match order(&change) {
             Ok(order) => {
                 let reply = Reply::new(move |outcome| {
@@ -274,6 +305,18 @@ mod tests {
             body: body.to_owned(),
         };
         order(&change).map_err(|refused| refused.status)
+    }
+
+    #[test]
+    fn each_patch_has_a_layout_file() {
+        for (patch, layout) in [
+            ("a/patch.toml", "a/patch.layout.toml"),
+            ("hall.1", "hall.1.layout.toml"),
+            ("hall.2", "hall.2.layout.toml"),
+            ("hall", "hall.layout.toml"),
+        ] {
+            assert_eq!(PatchBay::layout_beside(Path::new(patch)), Path::new(layout));
+        }
     }
 
     #[test]

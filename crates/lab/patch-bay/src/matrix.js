@@ -42,9 +42,9 @@ const matrix = (() => {
     const all = [...lab.clients.values()];
     rows = matching(all.flatMap(({ inputs }) => inputs));
     columns = matching(all.flatMap(({ outputs }) => outputs));
-    // The current cell stays with its channels.
-    const find = (pins, name) => Math.max(0, pins.findIndex((pin) => pin.name === name));
-    at = { row: find(rows, row), column: find(columns, column) };
+    // The current cell stays with its channels. Without one of them there is none (-1) until an arrow key is pressed.
+    const find = (pins, name, before) => (name === undefined ? before : pins.findIndex((pin) => pin.name === name));
+    at = { row: find(rows, row, at.row), column: find(columns, column, at.column) };
     grid.setAttribute('aria-rowcount', rows.length + 1);
     grid.setAttribute('aria-colcount', columns.length + 1);
     sheet.style.setProperty('width', `${SIDE + columns.length * CELL}px`);

@@ -237,8 +237,12 @@
   });
 
   function turn(work) {
-    if (mayChange) work();
-    else say('Read-only: nothing was changed.', true);
+    if (!mayChange) {
+      say('Read-only: nothing was changed.', true);
+      return;
+    }
+    layout.flush();
+    work();
   }
   get('undo').addEventListener('click', () => turn(changes.undo));
   get('redo').addEventListener('click', () => turn(changes.redo));

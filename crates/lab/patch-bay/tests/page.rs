@@ -203,6 +203,16 @@ fn a_program_patches_forces_and_sees_the_board() {
     });
 }
 
+#[test]
+fn a_layout_is_changed_while_nobody_looks() {
+    serve(|address, page| {
+        let _pump = Client::join(address, "VP PUMP Q01");
+        page.done("PUT /layout", r#"{"PUMP":{"x":480}}"#);
+        let (_, state) = page.ask("GET /state", "");
+        assert_eq!(state["places"]["PUMP"]["x"], 480);
+    });
+}
+
 /// The events of a page, as a viewer without the token gets them.
 struct Events(Lines<BufReader<TcpStream>>);
 

@@ -260,9 +260,10 @@
   for (const part of [board.clients, board.cables]) {
     part.addEventListener('pointerover', (event) => { if (event.pointerType !== 'touch' && !held) trace(event.target); });
     part.addEventListener('pointerleave', traceFocus);
-    part.addEventListener('focusin', traceFocus);
-    part.addEventListener('focusout', () => trace(null));
   }
+  // Not at the SVG: with such a listener, Chromium gives it a place in the order of Tab.
+  get('sheet').addEventListener('focusin', traceFocus);
+  get('sheet').addEventListener('focusout', () => trace(null));
 
   // Searching: other channels fade, and Enter goes from hit to hit.
 

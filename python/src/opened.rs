@@ -52,8 +52,8 @@ struct Opened {
     /// The slots that this end writes, and those that it reads.
     written: Vec<Range<usize>>,
     read: Vec<Range<usize>>,
-    /// The driver's place on the live page.
-    _shown: Option<Place>,
+    /// The driver's place on the live page; rows of a vector have none.
+    shown: Option<Place>,
 }
 
 impl Opened {
@@ -197,7 +197,11 @@ impl Handle {
             let place = DRIVERS.reserve()?;
             let mut driver = open(path, tables, &KINDS)?;
             let config = Arc::clone(driver.config());
-            let shown = page::show_driver(&mut driver)?;
+            // A page for each of a thousand drivers would have a thread and a history for each.
+            let shown = match row {
+                None => page::show_driver(&mut driver)?,
+                Some(_) => None,
+            };
             let signals: Vec<Description> = (0..config.table.signals.len())
                 .map(|index| Description::of(&SignalDescription::of(&driver, index), &config))
                 .collect();
@@ -215,7 +219,7 @@ impl Handle {
                 driver,
                 slots,
                 memory: Arc::clone(&memory),
-                _shown: shown,
+                shown,
             };
             let number = place.fill(&config.name, opened);
             Ok(Facts {
@@ -300,7 +304,8 @@ impl Handle {
 
     /// Returns the address of the page on which the driver is shown.
     pub(crate) fn page(&self) -> Result<Option<String>, Refusal> {
-        Ok(self.config()?.page.as_ref().and_then(|_| page::url()))
+        let is_shown = self.visit(|opened| opened.shown.is_some())?;
+        Ok(is_shown.then(page::url).flatten())
     }
 
     pub(crate) fn swallowed(&self) -> Result<String, Refusal> {

@@ -51,5 +51,13 @@ def test_two_drivers_share_a_page(paged, tmp_path):
         assert names == ["Live page", "Studio: Line", "Studio: Other"]
 
 
+def test_rows_of_a_vector_are_not_shown(paged):
+    with tickbus.open_vector(paged, 3) as vector:
+        assert [driver.page() for driver in vector] == [None] * 3
+        with tickbus.open(paged) as driver:
+            assert [tab["name"] for tab in ask(driver.page(), "/tabs")] == ["Live page", "Studio"]
+            assert vector[0].page() is None
+
+
 def test_a_driver_without_a_page_has_no_address(line):
     assert line.page() is None

@@ -18,9 +18,9 @@ pub(crate) use none::{NetsPlace, show_nets};
 pub(crate) use open::{NetsPlace, show_nets};
 
 #[cfg(not(feature = "page"))]
-pub use none::{Place, url};
+pub use none::{Place, forked, url};
 #[cfg(feature = "page")]
-pub use open::{Place, url};
+pub use open::{Place, forked, url};
 
 use tickbus_binding::Refusal;
 use tickbus_driver::{Code, Driver, Line, Watch};

@@ -34,6 +34,7 @@ const EVENTS: usize = 64;
 /// Notes a fork; called in the child process.
 pub(crate) fn forked() {
     FORKS.fetch_add(1, Ordering::Relaxed);
+    page::forked();
 }
 
 /// A tick, or one of its halves.

@@ -51,6 +51,29 @@ def test_two_drivers_share_a_page(paged, tmp_path):
         assert names == ["Live page", "Studio: Line", "Studio: Other"]
 
 
+def test_a_forked_child_has_its_own_page(paged, python):
+    result = python(
+        """
+import os, sys, urllib.request
+import tickbus
+line = tickbus.open(sys.argv[1])
+url = line.page()
+child = os.fork()
+if child == 0:
+    with tickbus.open(sys.argv[1]) as own:
+        assert own.page() != url
+        urllib.request.urlopen(own.page(), timeout=30).close()
+    os._exit(0)
+assert os.waitpid(child, 0)[1] == 0
+urllib.request.urlopen(url, timeout=30).close()
+line.close()
+print("ok")
+""",
+        paged,
+    )
+    assert (result.returncode, result.stdout.strip()) == (0, "ok"), result.stderr
+
+
 def test_rows_of_a_vector_are_not_shown(paged):
     with tickbus.open_vector(paged, 3) as vector:
         assert [driver.page() for driver in vector] == [None] * 3

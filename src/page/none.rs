@@ -80,6 +80,9 @@ impl NetsPlace {
     }
 }
 
+/// Does nothing: there is no page.
+pub const fn forked() {}
+
 /// Returns `None`: there is no page.
 pub const fn url() -> Option<String> {
     None

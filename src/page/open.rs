@@ -102,6 +102,14 @@ pub fn url() -> Option<String> {
     Some(present().upgrade()?.url.clone())
 }
 
+/// Forgets the parent's page, which nothing serves here; called in a forked child process.
+pub fn forked() {
+    // If another thread of the parent had the lock, nothing in the child releases it.
+    if let Ok(mut present) = PAGE.try_lock() {
+        *present = Weak::new();
+    }
+}
+
 /// Shows the views of `watch` on the page, if the driver.cfg asks for one. `announce` receives the address of a new
 /// page, and what a terminal shows below it.
 pub(crate) fn show(

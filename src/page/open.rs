@@ -43,6 +43,8 @@ struct Open {
     invitation: Invitation,
     /// The address that the first driver asked for.
     asked: Address,
+    /// The file that keeps the token across restarts.
+    token_file: Option<PathBuf>,
 }
 
 /// One of the served pages.
@@ -125,6 +127,15 @@ pub(crate) fn show(
     let token = wanted.token_file.as_ref();
     let token = token.map(|file| config.folder().join(file));
     let open = open(&config.name, (&wanted.listen, any), token.as_deref())?;
+    if wanted.listens_here() && !open.is_here {
+        return Err(PageError::WrongInput(format!(
+            "{}: [page] listens on {} alone, and this process serves its pages on {} already; open this driver first, or \
+             give the other pages 127.0.0.1",
+            config.path.display(),
+            wanted.listen,
+            open.asked
+        )));
+    }
     let (live, is_new) = open.live()?;
     let Some(watch) = (shown.watch)() else {
         return Ok(None);
@@ -332,6 +343,12 @@ fn open(
                 open.asked
             );
         }
+        if let Some(file) = token_file.filter(|file| open.token_file.as_deref() != Some(*file)) {
+            log::warn!(
+                "the token in {} of \"{name}\" is not used: the pages of this process have a token already",
+                file.display()
+            );
+        }
         return Ok(open);
     }
     let refused = |error: std::io::Error| {
@@ -359,6 +376,7 @@ fn open(
         url,
         invitation,
         asked: asked.clone(),
+        token_file: token_file.map(Path::to_owned),
     });
     *present = Arc::downgrade(&open);
     // Readers of the log must not be able to force signals: only whoever started this process gets the token.

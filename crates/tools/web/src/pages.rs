@@ -235,10 +235,10 @@ impl Pages {
         page.is_some_and(|(site, rest)| site.is_private(&rest))
     }
 
-    /// The largest body of a change of this path, in bytes.
-    pub(crate) fn longest_body(&self, path: &str) -> usize {
-        let page = self.page_of(path);
-        page.map_or(0, |(site, rest)| site.longest_body(&rest))
+    /// The largest body of a change of this path, in bytes; `None` if no page has the path.
+    pub(crate) fn longest_body(&self, path: &str) -> Option<usize> {
+        let (site, rest) = self.page_of(path)?;
+        Some(site.longest_body(&rest))
     }
 
     pub(crate) fn get(&self, path: &str, answer: Answer<Option<Document>>) {

@@ -129,8 +129,9 @@ fn each_page_has_its_paths() {
 fn the_page_of_a_path_says_how_large_a_body_is() {
     let pages = Pages::of("Live page", toy(&[]));
     let _joined = pages.join(Page::new("Board", "/board", toy(&[("/", "board")])));
-    assert_eq!(pages.longest_body("/x"), 0);
-    assert_eq!(pages.longest_body("/board/x"), 1);
+    assert_eq!(pages.longest_body("/x"), Some(0));
+    assert_eq!(pages.longest_body("/board/x"), Some(1));
+    assert_eq!(Pages::default().longest_body("/board/x"), None);
 }
 
 #[test]

@@ -126,7 +126,8 @@ async fn respond(hall: &Arc<Hall>, request: Request<Incoming>) -> Result<Respons
     if token != Token::Right {
         return Err(no_token(token));
     }
-    let body = body(hall, request, hall.pages.longest_body(&path)).await?;
+    let longest = hall.pages.longest_body(&path).ok_or_else(nobody)?;
+    let body = body(hall, request, longest).await?;
     let (answer, outcome) = Answer::new();
     hall.pages.change(Change { verb, path, body }, answer);
     let outcome = timeout(hall.patience, outcome).await;

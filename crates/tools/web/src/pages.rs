@@ -154,7 +154,9 @@ impl Pages {
         let kinds = || {
             entries.iter().find_map(|entry| {
                 let group = entry.group.as_ref()?;
-                Some((entry, within(path, &group.path)?))
+                let rest = within(path, &group.path)?;
+                // The path of another member, which may have left.
+                (!rest.starts_with("/of/")).then_some((entry, rest))
             })
         };
         let found = own

@@ -148,13 +148,15 @@ fn a_path_that_is_taken_gets_a_number() {
 #[test]
 fn several_pages_of_a_kind_have_a_path_each_and_the_first_one_that_of_the_kind() {
     let pages = Pages::of("Live page", toy(&[("/", "live")]));
-    let join = |id, name, text| {
-        let page = Page::new("Studio", "/studio", toy(&[("/", text)]));
+    let join_site = |id, name, site| {
+        let page = Page::new("Studio", "/studio", site);
         pages.join(page.one_of_several(id, name))
     };
+    let join = |id, name, text| join_site(id, name, toy(&[("/", text)]));
     let seven = join("7", "Left", "seven");
     assert_eq!(names(&pages), ["/ Live page", "/studio Studio"]);
-    let _eight = join("8", "Right", "eight");
+    let right = toy(&[("/", "eight")]);
+    let _eight = join_site("8", "Right", Arc::clone(&right) as _);
     assert_eq!(
         names(&pages)[1..],
         ["/studio/of/7 Studio: Left", "/studio/of/8 Studio: Right"]
@@ -165,6 +167,9 @@ fn several_pages_of_a_kind_have_a_path_each_and_the_first_one_that_of_the_kind()
     assert_eq!(text(&pages, "/studio"), Some("eight"));
     // Another driver's studio does not stand in for it.
     assert_eq!(text(&pages, "/studio/of/7"), None);
+    put(&pages, "/studio/of/7/cell");
+    put(&pages, "/studio/cell");
+    assert_eq!(*right.got.lock().expect("no panic"), ["/cell"]);
 }
 
 #[test]

@@ -17,8 +17,8 @@ impl Config {
     /// the defaults of the new line: a controller has a watchdog and leaves its fail-safe values behind. `[[station]]`
     /// tables contain the keys that the new bus needs for the file's stations, by name. A `[fieldbus]` without a `kind`
     /// changes only the `mode` of the file's own loopback. A `[record]` replaces the file's own; a bus that replays a
-    /// recording removes the file's own, which belongs to the plant. Replacing the bus also removes the file's
-    /// `[page]`.
+    /// recording removes the file's own, which belongs to the plant. A `[fieldbus]` also removes the
+    /// file's `[page]`.
     ///
     /// # Errors
     ///
@@ -40,6 +40,7 @@ fn read(mut config: Config, mut root: Table<'_>) -> Option<Config> {
     root.finish();
     let stations = stations.map(|value| value.tables("[[station]]"));
     if let Some(value) = fieldbus {
+        config.page = None;
         let table = value.table("[fieldbus]", "write a [fieldbus] table")?;
         read_fieldbus(&mut config, table, stations.unwrap_or_default())?;
     } else if let Some(table) = stations.unwrap_or_default().first() {
@@ -89,7 +90,6 @@ fn read_fieldbus(
         if bus.replayed().is_some() {
             config.record = None;
         }
-        config.page = None;
         // The values that this end leaves behind depend on the new line.
         config.timing.fit(Line::of(role, Some(&bus)));
         config.bus = bus;
@@ -217,9 +217,11 @@ mod tests {
 
     #[test]
     fn a_table_without_a_kind_changes_the_mode_of_the_file_s_own_bus() {
-        let plant = plant("kind = \"loopback\"\nprogram = \"mirror\"\nscan = \"7ms\"");
+        let plant = plant("kind = \"loopback\"\nprogram = \"mirror\"\nscan = \"7ms\"\n[page]");
+        assert!(plant.page.is_some());
         let test = plant.overlaid("test", "[fieldbus]\nmode = \"stepped\"\n");
         let test = test.expect("right");
+        assert_eq!(test.page, None);
         let options = loopback(&test);
         assert_eq!(options.mode, Mode::Stepped);
         assert!(

@@ -34,7 +34,12 @@ pub(crate) struct Shown<'a, W: FnOnce() -> Option<Watch>> {
     pub(crate) line: Option<Line>,
     /// Reads the file as it was read before; `None` if it cannot be edited here.
     pub(crate) read: Option<Read>,
+    /// The setting that opens the page for other computers, with `PORT` for its port.
+    pub(crate) setting: &'static str,
 }
+
+/// This setting on the command line.
+pub(crate) const FLAG: &str = "--page 0.0.0.0:PORT";
 
 /// Reads a driver.cfg, or says what is wrong.
 pub(crate) type Read = Box<dyn Fn() -> Result<Config, String> + Send + Sync>;
@@ -93,6 +98,7 @@ pub fn show_driver(driver: &mut Driver) -> Result<Option<Place>, Refusal> {
         line: driver.line(),
         watch: || Some(driver.watch()),
         read: Some(Box::new(read)),
+        setting: "listen = \"0.0.0.0:PORT\" in [page]",
     };
     Ok(show(shown, announce)?)
 }

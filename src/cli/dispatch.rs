@@ -143,7 +143,7 @@ fn serve_page(
     if let Some(file) = token_file {
         room.keep_token(file)?;
     }
-    let invitation = room.invitation().for_terminal();
+    let invitation = room.invitation().for_terminal(crate::page::FLAG);
     lab::say_page("dispatch", &room.url(), &invitation);
     let pages = tickbus_web::Pages::of("Patch bay", std::sync::Arc::new(site));
     room.serve(pages, Monotonic::shared())

@@ -179,6 +179,7 @@ pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
         read: Some(Box::new(move || {
             reading.read().map_err(|wrong| wrong.to_string())
         })),
+        setting: page::FLAG,
     };
     let _place = match page::show(shown, announce) {
         Ok(place) => place,
@@ -258,6 +259,7 @@ pub(super) fn show(
         watch,
         line: None,
         read: None,
+        setting: page::FLAG,
     };
     page::show(shown, announce(title)).map_err(|error| not_shown(title, &error))
 }

@@ -22,9 +22,10 @@ pub(crate) fn show(
         watch,
         line,
         read,
+        setting,
     } = shown;
     // Nothing is watched or edited.
-    drop((watch, line, read));
+    drop((watch, line, read, setting));
     if config.page.is_none() {
         return Ok(None);
     }

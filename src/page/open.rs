@@ -18,7 +18,7 @@ use tickbus_studio::{Running, Seat};
 use tickbus_virtual_time::Controls;
 use tickbus_web::{Invitation, Joined, Limits, Page, Pages, Room, Serving};
 
-use super::{PageError, Read, Shown};
+use super::{FLAG, PageError, Read, Shown};
 
 /// The page of this process, if there is one.
 static PAGE: Mutex<Weak<Open>> = Mutex::new(Weak::new());
@@ -148,7 +148,7 @@ pub(crate) fn show(
     };
     // Whoever opens the page finds the driver there.
     if is_new {
-        announce(&open.url, &open.invitation.for_terminal());
+        announce(&open.url, &open.invitation.for_terminal(shown.setting));
     }
     Ok(Some(Place {
         seat,
@@ -230,7 +230,7 @@ pub(crate) fn show_run(
     let (live, is_new) = open.live()?;
     let member = live.page.join_run(name, controls);
     if is_new {
-        announce(&open.url, &open.invitation.for_terminal());
+        announce(&open.url, &open.invitation.for_terminal(FLAG));
     }
     Ok(Place {
         seat: None,
@@ -319,7 +319,7 @@ pub(crate) fn show_recording(
     let member = live.page.join_recording(recorded);
     // Nothing can be forced, so nobody needs the token.
     let invitation = open.invitation.clone().without_token();
-    announce(open.plain_url(), &invitation.for_terminal());
+    announce(open.plain_url(), &invitation.for_terminal(FLAG));
     Ok(Place {
         seat: None,
         member: Some(member),

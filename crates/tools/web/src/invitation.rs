@@ -83,18 +83,19 @@ impl Invitation {
     }
 
     /// The lines that a terminal shows below the address: the other addresses, and a QR code of the best one. For a page that only
-    /// this computer opens, one line, once in a process. Not for logs, since it has the token.
-    pub fn for_terminal(&self) -> String {
+    /// this computer opens, one line, once in a process: that `setting` opens it for others, with the page's port for `PORT`. Not for
+    /// logs, since it has the token.
+    pub fn for_terminal(&self, setting: &str) -> String {
         static IS_TOLD: AtomicBool = AtomicBool::new(false);
 
         let mut text = String::new();
         // Writing to a string cannot fail.
         if self.is_here {
             if !IS_TOLD.swap(true, Ordering::Relaxed) {
-                let port = self.port;
+                let setting = setting.replace("PORT", &self.port.to_string());
                 let _ = writeln!(
                     text,
-                    "    for this computer alone; --page 0.0.0.0:{port} opens it for a phone"
+                    "    for this computer alone; {setting} opens it for a phone"
                 );
             }
             return text;
@@ -223,16 +224,19 @@ mod tests {
     fn a_page_of_this_computer_tells_once_how_a_phone_opens_it() {
         let bound = "127.0.0.1:20080".parse().expect("an address");
         let invitation = Invitation::new("http://127.0.0.1:20080/#token=12".to_owned(), bound);
-        let told = invitation.for_terminal();
-        assert!(told.contains("--page 0.0.0.0:20080"), "{told}");
-        assert_eq!(invitation.for_terminal(), "");
+        let told = invitation.for_terminal("listen = \"0.0.0.0:PORT\" in [page]");
+        assert!(
+            told.contains("; listen = \"0.0.0.0:20080\" in [page] opens"),
+            "{told}"
+        );
+        assert_eq!(invitation.for_terminal(""), "");
     }
 
     #[test]
     fn a_page_at_one_address_has_a_code_of_this_address() {
         let bound = "192.0.2.7:81".parse().expect("an address");
         let invitation = Invitation::new("http://lab.example:81/#token=12".to_owned(), bound);
-        let told = invitation.for_terminal();
+        let told = invitation.for_terminal("");
         assert!(told.starts_with(COLOURS), "no second line with it: {told}");
         assert_eq!(
             invitation.clone().without_token().others,

@@ -53,7 +53,8 @@ const head = (() => {
     const pages = JSON.parse(text);
     paths = pages.map(({ path }) => path);
     nav.replaceChildren(...pages.map(({ path, name }) => make("a", "", { href: path, textContent: name })));
-    nav.hidden = pages.length < 2;
+    // The only tab is the way out of a page that has left.
+    nav.hidden = pages.length === 0 || (pages.length === 1 && paths[0].split("#")[0] === (room.base || "/"));
     mark();
   }
 

@@ -6,6 +6,8 @@
   const get = (id) => document.getElementById(id);
   /** Nets in which nothing has fired for this long wait, in microseconds. */
   const PATIENCE = 3_000_000;
+  /** The pause before a layout that did not come is asked for again, in milliseconds. */
+  const PAUSE = 1000;
   /** The programs with nets on this page, by their numbers. */
   let sets = new Map();
   /** The page of the process that these numbers are from. */
@@ -32,6 +34,7 @@
 
   /** Makes the list of nets. */
   function list() {
+    const focused = all().find((net) => net.entry?.button === document.activeElement);
     get("sets").replaceChildren();
     for (const set of sets.values()) {
       if (sets.size > 1) make("h3", "", get("sets"), set.title);
@@ -51,21 +54,29 @@
     const title = sets.size === 1 ? sets.values().next().value.title : "Petri nets";
     head.title(title, title);
     get("choice").hidden = all().length < 2;
+    markChosen();
+    focused?.entry.button.focus({ preventScroll: true });
+  }
+
+  function markChosen() {
+    for (const net of all()) {
+      if (net === view?.net) net.entry.button.setAttribute("aria-current", "true");
+      else net.entry.button.removeAttribute("aria-current");
+    }
   }
 
   function choose(net) {
     view = new netView.View(net);
-    for (const other of all()) {
-      if (other === net) other.entry.button.setAttribute("aria-current", "true");
-      else other.entry.button.removeAttribute("aria-current");
-    }
+    markChosen();
   }
 
   /** Shows the present states. */
   function update() {
     const every = all();
     get("main").hidden = every.length === 0;
-    get("none").hidden = every.length > 0 || latest === null || latest.sets.length > 0;
+    const open = latest?.sets ?? [];
+    get("none").hidden = every.length > 0 || latest === null || open.length > 0;
+    get("undrawn").hidden = !open.length || open.some(({ drawn }) => drawn);
     if (!every.length) return;
     const cause = nets.cause(every, PATIENCE);
     for (const net of every) {
@@ -92,15 +103,25 @@
     if (asked.has(key)) return;
     asked.add(key);
     const here = run;
+    let layout = null;
     try {
       // A large layout takes its time.
       const answer = await fetch(`${room.base}/layout/${one.id}`, { signal: AbortSignal.timeout(60000) });
-      if (answer.ok && here === run) build(one, await answer.json());
+      if (answer.ok) layout = await answer.json();
     } catch {
-      // It is asked for again with the next state.
+      // It is asked for again.
     }
-    asked.delete(key);
-    if (latest) display(latest);
+    if (layout) {
+      asked.delete(key);
+      // Another process may have started meanwhile.
+      if (here === run) build(one, layout);
+      display(latest);
+      return;
+    }
+    setTimeout(() => {
+      asked.delete(key);
+      if (!isHeld || !view) display(latest);
+    }, PAUSE);
   }
 
   function display(state) {

@@ -51,6 +51,14 @@ def test_two_drivers_share_a_page(paged, tmp_path):
         assert names == ["Live page", "Studio: Line", "Studio: Other"]
 
 
+def test_a_driver_for_this_computer_alone_is_not_shown_beyond_it(paged, tmp_path):
+    second = tmp_path / "second.cfg"
+    second.write_text(paged.read_text().replace("id   = 7", "id   = 8").replace('"Line"', '"Other"'))
+    with tickbus.open(paged, {"page": {"listen": "0.0.0.0:0"}}):
+        with pytest.raises(tickbus.FieldbusError, match=r"second\.cfg: \[page\] listens on 127\.0\.0\.1:0 alone.*open this driver first"):
+            tickbus.open(second)
+
+
 def test_a_forked_child_has_its_own_page(paged, python):
     result = python(
         """

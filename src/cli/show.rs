@@ -12,7 +12,7 @@ use tickbus_driver_cfg::Kinds;
 /// Ctrl-C.
 #[derive(Debug, clap::Args)]
 pub(super) struct Arguments {
-    /// The recording of tickbus, VCD or CSV.
+    /// The recording: of tickbus, VCD or CSV, or VCD of another program.
     recording: PathBuf,
 
     /// The picture of the machine, SVG [default: that of --config].

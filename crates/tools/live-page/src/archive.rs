@@ -148,6 +148,11 @@ impl Archive {
     /// ticks from before it.
     pub(crate) fn note_faults(&self, faults: &[FaultStatus], before: u64) {
         let last = self.history.span().map_or(0, |span| span.last.0);
+        // Looked for without the lock, since that decodes a part of the history.
+        let pulses: Vec<Option<u64>> = faults
+            .iter()
+            .map(|fault| self.pulse_begin(fault, before))
+            .collect();
         let mut notes = self.notes();
         let Notes {
             marks,
@@ -155,7 +160,7 @@ impl Archive {
             forces,
             ..
         } = &mut *notes;
-        for fault in faults {
+        for (fault, pulse) in faults.iter().zip(pulses) {
             let mut now = Seen {
                 id: fault.id,
                 phase: fault.phase,
@@ -197,12 +202,14 @@ impl Archive {
                 },
                 begins: is_active,
             };
-            // A fault that is over already began as well; when is known only of one that lasts for a number of ticks.
+            // A fault that is over already began as well; when is known only of one that forces a signal for a given
+            // time or number of ticks.
             let lasts = mark.force.map(|force| force.lasts);
             let begin = (has_begun && !is_active).then(|| Mark {
                 begins: true,
                 tick: match lasts {
                     Some(Lasts::Ticks(ticks)) => tick.saturating_sub(ticks),
+                    Some(Lasts::For(_)) => pulse.map_or(tick, |begin| begin.min(tick)),
                     _ => tick,
                 },
                 ..mark.clone()
@@ -214,6 +221,36 @@ impl Archive {
         if seen.len() > MOST {
             seen.drain(..MOST / 2);
         }
+    }
+
+    /// The tick of the history in which a force that is over and lasted for a given time began.
+    fn pulse_begin(&self, fault: &FaultStatus, before: u64) -> Option<u64> {
+        if fault.phase == Phase::Active || fault.tick == 0 {
+            return None;
+        }
+        let (lasts, before) = {
+            let notes = self.notes();
+            let known = notes.seen.iter().find(|known| known.id == fault.id);
+            let known = known.filter(|known| known.begun > 0);
+            // Most faults that are over were noted long ago.
+            if known.is_some_and(|known| known.begun == fault.begun) {
+                return None;
+            }
+            let force = notes.forces.get(&fault.id)?;
+            (force.lasts, known.map_or(before, |known| known.before))
+        };
+        let Lasts::For(time) = lasts else {
+            return None;
+        };
+        let number = before + fault.tick;
+        let end = self.history.at(Moment::Tick(number))?;
+        // A tick that the history does not have yet or any more is not the end.
+        if end.number != number {
+            return None;
+        }
+        self.history
+            .at(Moment::Time(end.time - time))
+            .map(|begin| begin.number)
     }
 
     /// Notes that a recorded signal which tells of a fault has gone on, or off, at a tick.

@@ -12,7 +12,8 @@ use crate::value::Number;
 /// The length of a trend if none is asked for.
 const SPAN: Nanos = Nanos::from_secs(300);
 
-/// The most changes of a signal; of more, each of some spans has its first, least, greatest and last value.
+/// The most changes of a signal; of more, each of some spans has its first, least, greatest and last value, and
+/// the first unknown one.
 const MOST_POINTS: usize = 40_000;
 
 /// The most changes of all signals of a request, shared among them.
@@ -134,7 +135,7 @@ fn collect(
 struct Points {
     kept: Vec<(Nanos, f64)>,
     from: Nanos,
-    /// The length of a span of which four values are kept.
+    /// The length of a span of which five values are kept.
     length: i64,
     most: usize,
     is_thin: bool,
@@ -144,7 +145,7 @@ struct Points {
 
 impl Points {
     fn new((from, to): (Nanos, Nanos), most: usize) -> Self {
-        let spans = i64::try_from(most / 4).unwrap_or(1);
+        let spans = i64::try_from(most / 5).unwrap_or(1);
         Self {
             kept: Vec::new(),
             from,
@@ -181,14 +182,16 @@ impl Points {
         (at - self.from).0 / self.length
     }
 
-    /// Keeps the first, least, greatest and last value of the last span.
+    /// Keeps the first, least, greatest and last value of the last span, and the first unknown one.
     fn thin(&mut self) {
         let group = &self.kept[self.begin..];
         let by = |a: &&(Nanos, f64), b: &&(Nanos, f64)| a.1.total_cmp(&b.1);
+        let known = || group.iter().filter(|(_, value)| !value.is_nan());
         let ends = [
             group.first(),
-            group.iter().min_by(by),
-            group.iter().max_by(by),
+            known().min_by(by),
+            known().max_by(by),
+            group.iter().find(|(_, value)| value.is_nan()),
             group.last(),
         ];
         let mut ends: Vec<_> = ends.into_iter().flatten().copied().collect();
@@ -250,6 +253,28 @@ mod tests {
                 [f64::from(peak), -f64::from(peak + 1)]
             );
         }
+    }
+
+    #[test]
+    fn unknown_values_hide_no_peak() {
+        let until = 100_000;
+        let mut points = Points::new((Nanos::ZERO, Nanos(until)), 4_000);
+        for at in 0..=until {
+            let value = match at {
+                _ if at % 10 == 0 => f64::NAN,
+                54_321 => 9.0,
+                54_322 => -9.0,
+                _ => f64::from(u8::from(at % 2 == 0)),
+            };
+            points.push(Nanos(at), value);
+            assert!(points.kept.len() <= 4_000 + CROWD + 1);
+        }
+        let trend = points.trend();
+        assert!(trend.is_thin && trend.ms.is_sorted());
+        let at = trend.values.iter().position(|value| *value == 9.0);
+        let at = at.expect("the peak is there");
+        assert_eq!(trend.values[at + 1], -9.0);
+        assert!(trend.values[at - 3..at].iter().any(|value| value.is_nan()));
     }
 
     #[test]

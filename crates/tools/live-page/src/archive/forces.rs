@@ -86,7 +86,14 @@ impl Archive {
             if mark.begins {
                 on = Some(mark.text);
                 let own = points.iter().rev().find(|(time, _)| *time <= at);
-                let own = own.and_then(|(_, value)| *value);
+                let own = own.and_then(|(_, value)| *value).or_else(|| {
+                    // The ramp began before the first of these points.
+                    let is_open = matches!(force.effect, SignalEffect::Ramp { from: None, .. });
+                    let tick = is_open
+                        .then(|| self.history.at(Moment::Time(at)))
+                        .flatten()?;
+                    Some(tick.values[signal])
+                });
                 let (steps, length) = match force.effect {
                     SignalEffect::Ramp { within, .. } => (STEPS, within),
                     _ => (0, Nanos::ZERO),

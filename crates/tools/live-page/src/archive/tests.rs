@@ -197,6 +197,8 @@ fn a_ramp_goes_evenly_and_one_tick_is_one_tick_however_rarely_the_page_looks() {
         [2, 3, 8, 13, 15].map(value),
         [0.0, 0.0, 50.0, 100.0, 100.0].map(Some)
     );
+    // A request that begins after the ramp began.
+    assert_eq!(trend(8, 30)[0], (8_000_000, 50.0));
     // Released on its way.
     archive.note_faults(&[forced(1, Phase::Over, 1, 8)], 0);
     assert_eq!(trend(0, 30).last(), Some(&(8_000_000, 0.0)));
@@ -206,6 +208,14 @@ fn a_ramp_goes_evenly_and_one_tick_is_one_tick_however_rarely_the_page_looks() {
         trend(14, 30),
         [(14_000_000, 0.0), (15_000_000, 7.0), (16_000_000, 0.0)]
     );
+    // A pulse that begins and ends between two looks.
+    archive.note_force(3, Way::Pulse(ms(2)).force(0, Slot::from_real(9.0), None));
+    archive.note_faults(&[forced(3, Phase::Over, 1, 19)], 0);
+    assert_eq!(
+        trend(16, 30),
+        [(16_000_000, 0.0), (17_000_000, 9.0), (19_000_000, 0.0)]
+    );
+    assert_eq!([16, 17, 18, 19].map(value), [0.0, 9.0, 9.0, 0.0].map(Some));
 }
 
 #[test]

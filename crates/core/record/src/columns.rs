@@ -31,6 +31,16 @@ impl ValueKind {
         }
     }
 
+    /// The type of a plain signal with such values, for a column whose type is unknown.
+    pub const fn data_type(self) -> DataType {
+        match self {
+            Self::Bit => DataType::Bool,
+            Self::Signed => DataType::Lint,
+            Self::Unsigned => DataType::Ulint,
+            Self::Real | Self::Count => DataType::Lreal,
+        }
+    }
+
     /// The value as recorded: a BOOL that is neither 0 nor NaN becomes 1, and every NaN the same NaN.
     pub fn kept(self, slot: Slot) -> Slot {
         let value = slot.real();
@@ -54,7 +64,7 @@ pub struct Column {
     pub kind: ValueKind,
     /// The signal's address; unknown in a CSV file, and without meaning in a recording of virtual time.
     pub address: Option<Address>,
-    /// The signal's type; unknown in a CSV file.
+    /// The signal's type; unknown in a CSV file, whose columns get the type of their kind if they are written as VCD.
     pub data_type: Option<DataType>,
     /// The signal's unit, for people.
     pub unit: Option<String>,

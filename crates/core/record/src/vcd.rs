@@ -71,11 +71,10 @@ impl VcdSink {
         for (id, column) in ids.iter().zip(&columns.columns) {
             let what = if column.is_edges { "edges" } else { "signal" };
             let mut line = format!("{what} {id}");
+            let data_type = column.data_type.unwrap_or(column.kind.data_type());
+            let address = column.address.map(|address| address.to_string());
             // Writing to a string cannot fail.
-            if let Some(data_type) = column.data_type {
-                let address = column.address.map(|address| address.to_string());
-                let _ = write!(line, " {} {data_type}", address.as_deref().unwrap_or("-"));
-            }
+            let _ = write!(line, " {} {data_type}", address.as_deref().unwrap_or("-"));
             let _ = write!(line, " {}", quoted(&column.name));
             if column.is_scaled_integer() {
                 line.push_str(" scaled");

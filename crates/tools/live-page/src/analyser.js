@@ -10,7 +10,7 @@ const analyser = (() => {
   /** The most signals. */
   const ROOM = 24;
   /** The shortest time on the axis, in milliseconds. */
-  const LEAST = 0.1;
+  const LEAST = 1e-5;
   /** The axis can always be as long as this, in milliseconds. */
   const LENGTHY = 60000;
   /** The time between two requests for what is new, in milliseconds. */
@@ -19,8 +19,8 @@ const analyser = (() => {
   const MOST = 60000;
   /** An integer with more values than this is a curve. */
   const STATES = 16;
-  /** A nanosecond, in milliseconds: times of two drivers are converted into each other, and rounded. */
-  const TINY = 1e-6;
+  /** Less than half a nanosecond, in milliseconds: times of two drivers are converted into each other, and rounded. */
+  const TINY = 4e-7;
   const KIND = "application/x-tickbus-signal";
   /** Where this tab keeps the signals and the length of the axis for the next load of the page. */
   const STORE = "tickbus analyser";

@@ -114,7 +114,8 @@ fn document(model: &Shared, path: &str) -> Option<Document> {
         return Some(Document { kind: JSON, text });
     }
     let mut parts = path.strip_prefix(HISTORY)?.split('/');
-    let archive = archive(model, parts.next()?)?;
+    let id = parts.next()?;
+    let archive = archive(model, id)?;
     let parts: Vec<&str> = parts.collect();
     let text = match parts[..] {
         [] => archive.overview(),
@@ -124,7 +125,11 @@ fn document(model: &Shared, path: &str) -> Option<Document> {
         }
         ["next", what, tick] => archive.jump(what, true, tick.parse().ok()?)?,
         ["last", what, tick] => archive.jump(what, false, tick.parse().ok()?)?,
-        ["save", from, file] => return save(&archive, from, file),
+        ["save", from, file] => {
+            let id = id.parse().ok()?;
+            let title = model.with(|model| model.driver(id).map(|it| it.name().to_owned()))?;
+            return save(&archive, &title, from, file);
+        }
         _ => return None,
     };
     Some(Document { kind: JSON, text })
@@ -171,8 +176,8 @@ fn moment(kind: &str, place: &str) -> Option<Moment> {
     }
 }
 
-/// The ticks from a time to that in the name of the file, as a file.
-fn save(archive: &Archive, from: &str, file: &str) -> Option<Document> {
+/// The ticks from a time to that in the name of the file, as a file. A report has this title.
+fn save(archive: &Archive, title: &str, from: &str, file: &str) -> Option<Document> {
     let (to, ending) = file.rsplit_once('.')?;
     let span = (time(from)?, time(to)?);
     let of = |format| {
@@ -182,23 +187,20 @@ fn save(archive: &Archive, from: &str, file: &str) -> Option<Document> {
     let (kind, text) = match ending {
         "vcd" => ("text/plain; charset=utf-8", of(Format::Vcd)?),
         "csv" => ("text/csv; charset=utf-8", of(Format::Csv)?),
-        "html" => (
-            "text/html; charset=utf-8",
-            report(archive, of(Format::Vcd)?)?,
-        ),
+        "html" => ("text/html; charset=utf-8", report(title, of(Format::Vcd)?)?),
         _ => return None,
     };
     Some(Document { kind, text })
 }
 
 /// The report of a recording.
-fn report(archive: &Archive, vcd: String) -> Option<String> {
+fn report(title: &str, vcd: String) -> Option<String> {
     let source = "recording of the live page";
     let vcd = Box::new(Cursor::new(vcd.into_bytes()));
     let mut recording = Recording::read(source, Format::Vcd, vcd, None).ok()?;
     let (run, _) = tickbus_report::read(&mut recording, DEFAULT_BUDGET);
     let contents = Contents {
-        title: &archive.history.columns().driver,
+        title,
         source,
         run: &run,
         steps: None,
@@ -210,4 +212,50 @@ fn report(archive: &Archive, vcd: String) -> Option<String> {
     let mut out = Vec::new();
     tickbus_report::write(&contents, &mut out).ok()?;
     String::from_utf8(out).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use tickbus_record::Tick;
+
+    use super::*;
+    use crate::recorded::Recorded;
+
+    /// All ticks of a recording, with the names of its signals.
+    fn ticks(recording: &mut Recording) -> (Vec<String>, Vec<Tick>) {
+        let columns = recording.columns().clone();
+        let mut tick = Tick::new(&columns);
+        let mut ticks = Vec::new();
+        while recording.next(&mut tick).expect("it is whole") {
+            ticks.push(tick.clone());
+        }
+        (columns.columns.iter().map(|it| it.title()).collect(), ticks)
+    }
+
+    #[test]
+    fn files_without_a_driver_and_types_are_saved_and_read_again() {
+        const CSV: &str = "bus.tick,bus.time_ns,bus.status,bus.dropped,Lamp,Lamp.edges\n\
+                           1,1000000,0,0,1,0\n2,2000000,0,0,0,3\n";
+        let icarus = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../tests/it/vcd/icarus.vcd");
+        let foreign = || Recording::open_any(&icarus, None).expect("VCD");
+        let csv = || Recording::read("run.csv", Format::Csv, Box::new(Cursor::new(CSV)), None);
+        let csv = || csv().expect("CSV");
+        let opens: [(&str, &dyn Fn() -> Recording); 2] = [("run.vcd", &foreign), ("run.csv", &csv)];
+        for (name, open) in opens {
+            let recorded = Recorded::read(&mut open(), name, None, &[], 1 << 20).expect("ticks");
+            let save = |file: &str| {
+                let document = save(&recorded.archive, name, "0", file);
+                document.unwrap_or_else(|| panic!("{name} as {file}")).text
+            };
+            let vcd = Box::new(Cursor::new(save("9.vcd").into_bytes()));
+            let again = Recording::read("again", Format::Vcd, vcd, None);
+            let mut again = again.unwrap_or_else(|error| panic!("{name}: {error}"));
+            let text = |ticks: (Vec<String>, Vec<Tick>)| format!("{ticks:?}");
+            assert_eq!(text(ticks(&mut again)), text(ticks(&mut open())), "{name}");
+            let report = save("9.html");
+            assert!(report.contains(&format!("<h1>{name}</h1>")), "{name}");
+        }
+    }
 }

@@ -23,7 +23,7 @@ use crate::sheet::{DriverJson, STALE, Sheet, SignalJson};
 /// A recording in memory, for a page.
 #[derive(Debug)]
 pub struct Recorded {
-    archive: Arc<Archive>,
+    pub(crate) archive: Arc<Archive>,
     title: String,
     role: String,
     stations: Vec<String>,
@@ -281,12 +281,7 @@ fn made(column: &Column) -> Signal {
     let data_type = column
         .data_type
         .filter(is_same)
-        .unwrap_or(match column.kind {
-            ValueKind::Bit => DataType::Bool,
-            ValueKind::Signed => DataType::Lint,
-            ValueKind::Unsigned => DataType::Ulint,
-            ValueKind::Real | ValueKind::Count => DataType::Lreal,
-        });
+        .unwrap_or(column.kind.data_type());
     match column.address {
         Some(address) => Signal {
             bit: address.bit,

@@ -6,6 +6,8 @@
 const touch = (() => {
   /** The shortest time for which a button is pressed, in milliseconds, so that a slow PLC sees a short tap. */
   const SHORTEST = 200;
+  /** The time after which the page has heard of a press, or of its release by another page, in milliseconds. */
+  const SETTLED = 2000;
   const KINDS = { press: "push-button", switch: "switch" };
   let act = {};
   /** All pictures, each `{ root, frame, marks, tip, parts }`, and the part by its element. */
@@ -14,7 +16,7 @@ const touch = (() => {
   /** The part below the pointer, and the one with the focus. */
   let hovered = null;
   let focused = null;
-  /** The pressed buttons by their paths: `{ signal, part, by, since, sent, isPressed, isSeen, isLeft }`, and the paths whose release has not arrived. */
+  /** The pressed buttons by their paths: `{ signal, part, by, since, sent, isPressed, isSettled, isLeft }`, and the paths whose release has not arrived. */
   const held = new Map();
   const owed = new Set();
   let isOld = true;
@@ -160,7 +162,12 @@ const touch = (() => {
     if (one.isPressed && isQuiet) act.say("");
     else if (one.isPressed) act.say(`${signal.name} is ${one.isLeft ? "let go" : "pressed"}.`);
     else if (answer) act.say(answer.text, true);
-    if (!one.isPressed) letGo(path);
+    if (!one.isPressed) return letGo(path);
+    // Before, the mark can be that of the press before, and it may come and go without being drawn.
+    setTimeout(() => {
+      one.isSettled = true;
+      show();
+    }, SETTLED);
   }
 
   /** Lets go of a button, not before its press has arrived and a slow PLC has seen it. */
@@ -343,13 +350,8 @@ const touch = (() => {
   function show() {
     if (bar.moment && held.size) letGoAll();
     for (const [path, one] of held) {
-      const isForced = plant.isForcedNow(one.signal);
-      if (one.isSeen && !isForced && !one.isLeft) {
-        // Released here as well: the mark may be older than the press.
-        letGo(path, `${one.signal.name} was let go by another page.`);
-      }
-      // Until the press is answered, the mark can be that of the press before.
-      one.isSeen ||= one.isPressed && isForced;
+      // Released here as well: the mark may be older than the press.
+      if (one.isSettled && !plant.isForcedNow(one.signal) && !one.isLeft) letGo(path, `${one.signal.name} was let go by another page.`);
     }
     for (const sheet of sheets) showOne(sheet);
   }

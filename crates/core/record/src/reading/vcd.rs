@@ -272,7 +272,10 @@ impl Header {
 
     fn driver(&mut self, mut words: Words<'_>) -> Option<()> {
         self.columns.driver = words.next()?.quoted()?;
-        words.next()?.plain()?.clone_into(&mut self.columns.role);
+        // VCD of another program and CSV that were saved as a recording have no role.
+        if let Some(role) = words.next() {
+            role.plain()?.clone_into(&mut self.columns.role);
+        }
         Some(())
     }
 

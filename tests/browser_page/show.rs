@@ -86,3 +86,45 @@ fn a_recording_opens_at_its_end_and_goes_to_any_moment() {
     assert_fits(&browser);
     assert_quiet(&browser);
 }
+
+/// A clock that changes every nanosecond, as of a simulator of hardware.
+#[test]
+fn a_recording_of_nanoseconds_has_an_axis_and_edges() {
+    let screenshots = crate::screenshots();
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut vcd = String::from(
+        "$timescale 1ns $end\n$scope module top $end\n$var wire 1 ! clk $end\n$upscope $end\n$enddefinitions $end\n",
+    );
+    for at in 0..=20 {
+        writeln!(vcd, "#{at}\n{}!", at % 2).expect("there is room");
+    }
+    let file = folder.path().join("clock.vcd");
+    fs::write(&file, vcd).expect("there is room");
+    let mut show = Running::of("show", &[&file.display().to_string()]);
+    let url = show.after("show: page at ");
+    let browser = Browser::start(1280, 800);
+    browser.go(&url);
+    let moment = |text: &str| {
+        browser.wait(&format!(
+            "document.getElementById('moment').textContent === '{text}'"
+        ));
+    };
+    moment("0.000000020 s of 0.000000020 s · tick 21");
+    browser.run("analyser.add(plant.signals[0])");
+    browser.wait("analyser.tracks[0].times.length === 21");
+    let view = browser.run("const { begin, end } = analyser.view; return [begin, end]");
+    let nanos = |at: usize| (view[at].as_f64().expect("a time") * 1e6).round();
+    assert_eq!([nanos(0), nanos(1)], [0.0, 20.0], "all of it");
+    for at in [19, 18, 17] {
+        browser.run("analyser.toEdge(-1)");
+        moment(&format!(
+            "0.0000000{at} s of 0.000000020 s · tick {}",
+            at + 1
+        ));
+    }
+    browser.run("analyser.toEdge(1)");
+    moment("0.000000018 s of 0.000000020 s · tick 19");
+    shoot(&browser, screenshots.as_deref(), "show-nanoseconds", false);
+    assert_fits(&browser);
+    assert_quiet(&browser);
+}

@@ -92,9 +92,10 @@ const analyser = (() => {
 
   function all() {
     if (!bar.lead?.past) return;
-    const { first, last } = bar.lead.past;
-    if (held === null) span = Math.max(last - first, 1000);
-    else look(first, Math.max(last - first, 1000));
+    const { isRecording, past: { first, last } } = bar.lead;
+    const length = Math.max(last - first, isRecording ? LEAST : 1000);
+    if (held === null && !isRecording) span = length;
+    else look(first, length);
     changed();
   }
 
@@ -123,7 +124,8 @@ const analyser = (() => {
     if (tracks.length === ROOM) return act.say(`The axis has room for ${ROOM} signals; remove one first.`, true);
     if (!tracks.length) {
       held = null;
-      if (bar.moment) look(bar.moment.ms - span / 2, span);
+      if (bar.lead.isRecording) all();
+      else if (bar.moment) look(bar.moment.ms - span / 2, span);
     }
     tracks.push(trackOf(signal));
     build();
@@ -493,7 +495,8 @@ const analyser = (() => {
     if (one !== null) told.push(cursor("1", one, tick));
     if (second) told.push(cursor("2", second.ms, second.tick));
     if (one !== null && second) {
-      const ms = (second.ms - one).toFixed(3).replace("-", "−");
+      const far = second.ms - one;
+      const ms = far.toFixed(Math.abs(far) < 1 ? 6 : 3).replace("-", "−");
       const ticks = tick === null || second.tick === null ? "…" : words.count(second.tick - tick, "tick", "ticks").replace("-", "−");
       told.push(`distance ${ticks}, ${ms} ms`);
     }

@@ -202,7 +202,7 @@ const bar = (() => {
     const height = 10;
     const ctx = context(canvas, width, height);
     // As wide as the way of the handle.
-    const x = (ms) => 8 + (ms - first) / Math.max(1, last - first) * (width - 16);
+    const x = (ms) => 8 + (ms - first) / (last - first || 1) * (width - 16);
     ctx.fillStyle = colours.idle;
     ctx.fillRect(x(first), 3, x(last) - x(first), 4);
     for (const [begin, end] of overview.outages) {

@@ -208,6 +208,7 @@ const plant = (() => {
   function now(driver) {
     const { past } = driver;
     if (!past) return time + (performance.now() - heard);
+    if (driver.isRecording) return past.last;
     return past.last + Math.min(ASSUMED, performance.now() - past.heard) * past.speed;
   }
 
@@ -266,7 +267,11 @@ const words = {
     return `${Math.floor(ms / 3600000)} h`;
   },
   /** A time of a run in milliseconds. */
-  moment: (ms) => `${(ms / 1000).toFixed(3).replace("-", "−")} s`,
+  moment(ms) {
+    // A short recording is one of hardware, with nanoseconds.
+    const isShort = plant.drivers.some(({ isRecording, past }) => isRecording && past && past.last - past.first < 1000);
+    return `${(ms / 1000).toFixed(isShort ? 9 : 3).replace("-", "−")} s`;
+  },
   /** A length of time in microseconds. */
   fine(us) {
     if (us < 1000) return `${Number(us.toPrecision(3))} µs`;

@@ -36,6 +36,8 @@ pub(crate) struct Shown<'a, W: FnOnce() -> Option<Watch>> {
     pub(crate) read: Option<Read>,
     /// The setting that opens the page for other computers, with `PORT` for its port.
     pub(crate) setting: &'static str,
+    /// False if lists of signals cannot be kept beside the driver.cfg.
+    pub(crate) keeps_lists: bool,
 }
 
 /// This setting on the command line.
@@ -99,6 +101,7 @@ pub fn show_driver(driver: &mut Driver) -> Result<Option<Place>, Refusal> {
         watch: || Some(driver.watch()),
         read: Some(Box::new(read)),
         setting: "listen = \"0.0.0.0:PORT\" in [page]",
+        keeps_lists: true,
     };
     Ok(show(shown, announce)?)
 }

@@ -38,6 +38,7 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
         has_replies: true,
         bus: None,
         interval: arguments.tick,
+        keeps_lists: true,
     };
     host::run(job, &arguments.host)
 }

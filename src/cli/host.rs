@@ -120,6 +120,8 @@ pub(super) struct Job<'a> {
     /// The kind of bus in the place of the file's own.
     pub(super) bus: Option<&'a str>,
     pub(super) interval: Nanos,
+    /// False if the folder of the file does not outlast the command.
+    pub(super) keeps_lists: bool,
 }
 
 /// Returns how the driver.cfg of this job is read.
@@ -180,6 +182,7 @@ pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
             reading.read().map_err(|wrong| wrong.to_string())
         })),
         setting: page::FLAG,
+        keeps_lists: job.keeps_lists,
     };
     let _place = match page::show(shown, announce) {
         Ok(place) => place,
@@ -260,6 +263,7 @@ pub(super) fn show(
         line: None,
         read: None,
         setting: page::FLAG,
+        keeps_lists: true,
     };
     page::show(shown, announce(title)).map_err(|error| not_shown(title, &error))
 }

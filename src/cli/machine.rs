@@ -108,7 +108,7 @@ fn prepare_and_run(
             }
             grade(arguments, &folder, program, kinds)
         }
-        None => Ok(host(arguments, &folder, kinds)),
+        None => Ok(host(arguments, (&folder, unpacked.is_some()), kinds)),
     }
 }
 
@@ -191,7 +191,11 @@ fn grade(
     Ok(test::run(&tests, kinds))
 }
 
-fn host(arguments: &Arguments, folder: &Path, kinds: &'static Kinds) -> Outcome {
+fn host(
+    arguments: &Arguments,
+    (folder, is_unpacked): (&Path, bool),
+    kinds: &'static Kinds,
+) -> Outcome {
     let job = Job {
         title: "machine",
         file: &folder.join(CONFIG),
@@ -201,6 +205,7 @@ fn host(arguments: &Arguments, folder: &Path, kinds: &'static Kinds) -> Outcome 
         has_replies: true,
         bus: arguments.bus.as_deref(),
         interval: arguments.tick,
+        keeps_lists: !is_unpacked,
     };
     host::run(job, &arguments.host)
 }

@@ -35,6 +35,7 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
         program: Box::new(Idle),
         bus: None,
         interval: arguments.tick,
+        keeps_lists: true,
     };
     host::run(job, &arguments.host)
 }

@@ -88,6 +88,7 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
         role,
         program: Box::new(player),
         interval: arguments.tick,
+        keeps_lists: true,
     };
     match host::run(job, &arguments.host) {
         // The bus has not failed: the recording is damaged.

@@ -73,6 +73,7 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
         has_replies: false,
         bus: None,
         interval,
+        keeps_lists: true,
     };
     host::run(job, &arguments.host)
 }

@@ -23,6 +23,7 @@ pub(crate) fn show(
         line,
         read,
         setting,
+        keeps_lists: _,
     } = shown;
     // Nothing is watched or edited.
     drop((watch, line, read, setting));

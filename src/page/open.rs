@@ -122,7 +122,10 @@ pub(crate) fn show(
     let Some(wanted) = &config.page else {
         return Ok(None);
     };
-    let options = options(config)?;
+    let mut options = options(config)?;
+    if !shown.keeps_lists {
+        options.lists = None;
+    }
     let any = "listen = \"127.0.0.1:0\" in [page], or --page 127.0.0.1:0,";
     let token = wanted.token_file.as_ref();
     let token = token.map(|file| config.folder().join(file));

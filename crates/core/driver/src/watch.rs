@@ -234,12 +234,21 @@ impl Watch {
     ///
     /// # Errors
     ///
-    /// Too many faults are waiting or active, or the simulation no longer takes orders; then nothing is changed.
+    /// Too many faults are waiting or active, those of `end` included, or the simulation no longer takes orders; then
+    /// nothing is changed.
     ///
     /// # Panics
     ///
     /// When there is no such signal.
     pub fn force_all(&mut self, forces: &[Force], end: Vec<u32>) -> Result<Vec<u32>, Mistake> {
+        // A prepared fault stays on the list until the tick has seen it, so none is prepared in vain.
+        let (room, needed) = (self.figures.board.room(), forces.len());
+        if needed > room {
+            return Err(Mistake::new(
+                format!("there is room for {room} more faults, and not for {needed}"),
+                "end some of them",
+            ));
+        }
         let mut begin: Vec<Prepared> = Vec::with_capacity(forces.len());
         for force in forces {
             let name = format!("forced: {}", self.config.table.signals[force.signal].name);
@@ -381,5 +390,29 @@ mod tests {
         driver.exchange(Nanos::from_millis(401), &mut slots);
         assert!(watch.update());
         assert_eq!(status.state(), LinkState::Running);
+    }
+
+    #[test]
+    fn several_forces_without_room_change_nothing() {
+        let (mut driver, mut watch, mut slots) = watched();
+        let force = Force {
+            signal: 0,
+            effect: SignalEffect::Stuck(Some(Slot::from_real(1.0))),
+            lasts: Lasts::UntilEnded,
+        };
+        let held = watch.force_all(&[force; 40], Vec::new()).expect("room");
+        driver.exchange(Nanos::from_millis(2), &mut slots);
+        // The old ones are on the list until the tick has ended them.
+        let before = watch.faults().len();
+        let refused = watch.force_all(&[force; 40], held.clone());
+        let right = "there is room for 24 more faults, and not for 40; end some of them";
+        assert_eq!(refused.expect_err("no room").to_string(), right);
+        assert_eq!(watch.faults().len(), before);
+        assert!(held.iter().all(|id| watch.is_fault_on(*id)));
+        watch.force_all(&[force; 24], held).expect("room");
+        for tick in 3..5 {
+            driver.exchange(Nanos::from_millis(tick), &mut slots);
+        }
+        watch.force_all(&[force; 40], Vec::new()).expect("room");
     }
 }

@@ -42,7 +42,8 @@ const format = (() => {
     return signal.raw;
   }
 
-  const next = (signal) => watch.setFormat(signal, NAMES[(NAMES.indexOf(watch.formatOf(signal)) + 1) % NAMES.length]);
+  /** A BOOL has no other format. */
+  const next = (signal) => { if (!signal.isBool) watch.setFormat(signal, NAMES[(NAMES.indexOf(watch.formatOf(signal)) + 1) % NAMES.length]); };
 
   return { value, raw, next };
 })();

@@ -215,6 +215,7 @@
     } else if (bar.key(event)) {
       // The bar of time has used it.
     } else if (event.key === "/") {
+      views.reveal("signals");
       get("filter").focus();
       get("filter").select();
     } else if (isTray && list.chosen?.isBool && mayForce && (event.key === "1" || event.key === "0")) {

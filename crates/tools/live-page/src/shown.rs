@@ -8,6 +8,7 @@ use tickbus_base::statistics::Statistics;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{did_you_mean, shown};
 use tickbus_driver::Watch;
+use tickbus_fieldbus::faults::SignalEffect;
 use tickbus_fieldbus::{Link, LinkState, Role};
 use tickbus_image::signal::{Area, Latch, Signal, Slot};
 use tickbus_web::Refused;
@@ -54,17 +55,20 @@ pub(crate) struct Shown {
 struct Force {
     /// The fault's number.
     fault: u32,
-    /// The value that it has, or that a ramp reaches.
+    /// The value that the signal has, or that a ramp reaches.
     value: Slot,
     way: Way,
+    /// The value at which a ramp begins, if the signal was forced before.
+    from: Option<Slot>,
 }
 
 impl Force {
-    /// The value at this moment.
-    fn now(&self, watch: &Watch) -> Slot {
-        let ramp = matches!(self.way, Way::Ramp(_));
-        let value = ramp.then(|| watch.ramp_value(self.fault)).flatten();
-        value.unwrap_or(self.value)
+    /// The value at this moment; `None` while a ramp from the signal's own value has not begun.
+    fn now(&self, watch: &Watch) -> Option<Slot> {
+        match self.way {
+            Way::Ramp(_) => watch.ramp_value(self.fault).or(self.from),
+            _ => Some(self.value),
+        }
     }
 }
 
@@ -128,8 +132,8 @@ impl Shown {
         let mut values = watch.view(|view| view.slots.to_vec());
         for (index, signal) in table.signals.iter().enumerate() {
             if signal.area == writes {
-                if let Some(force) = forced.get(&index) {
-                    values[index] = force.now(watch);
+                if let Some(value) = forced.get(&index).and_then(|force| force.now(watch)) {
+                    values[index] = value;
                 }
                 if has_stopped {
                     values[index] = signal.fail_safe;
@@ -232,10 +236,10 @@ impl Shown {
             age_ms: if is_written { None } else { millis(age) },
             failsafe: row.flags & FAIL_SAFE != 0,
             stale: row.flags & STALE != 0,
-            forced: self
-                .forced
-                .get(&index)
-                .map(|force| Number::of(signal, force.now(&self.watch))),
+            forced: self.forced.get(&index).map(|force| {
+                let now = force.now(&self.watch);
+                Number::of(signal, now.unwrap_or(row.slot))
+            }),
         }
     }
 
@@ -363,7 +367,8 @@ impl Exhibit for Shown {
         let before = wanted.keys().filter_map(|index| self.forced.get(index));
         let ends = before.map(|force| force.fault).collect();
         let forces = wanted.iter().map(|(index, (value, way))| {
-            let from = self.forced.get(index).map(|force| force.now(&self.watch));
+            let before = self.forced.get(index);
+            let from = before.and_then(|force| force.now(&self.watch));
             way.force(*index, *value, from)
         });
         let forces: Vec<_> = forces.collect();
@@ -377,7 +382,17 @@ impl Exhibit for Shown {
             if let Some(archive) = &self.archive {
                 archive.note_force(fault, *force);
             }
-            self.forced.insert(index, Force { fault, value, way });
+            let from = match force.effect {
+                SignalEffect::Ramp { from, .. } => from,
+                _ => None,
+            };
+            let force = Force {
+                fault,
+                value,
+                way,
+                from,
+            };
+            self.forced.insert(index, force);
         }
         Ok(())
     }

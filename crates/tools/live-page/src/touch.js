@@ -281,6 +281,9 @@ const touch = (() => {
     }
     button.addEventListener("pointerdown", (event) => {
       if (event.button !== 0) return;
+      // The focus moves before the press: the end of the one on the button in the picture would end this press as well.
+      event.preventDefault();
+      button.focus({ preventScroll: true });
       button.setPointerCapture(event.pointerId);
       press(part, event.pointerId, true);
     });

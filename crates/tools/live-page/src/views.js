@@ -78,6 +78,10 @@ const views = (() => {
   });
   window.addEventListener("popstate", read);
   phone.addEventListener("change", redraw);
+  /** On a phone the rows come first, and the tools of the list are folded. */
+  const fold = () => { document.getElementById("watch-fold").open = !phone.matches; };
+  phone.addEventListener("change", fold);
+  fold();
 
   return {
     redraw, focus,

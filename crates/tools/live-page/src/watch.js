@@ -10,18 +10,20 @@ const watch = (() => {
   const PERIOD = 3000;
   let act = {};
   /** Signals are named as in `plant.keyOf`. */
-  let view = { ...FRESH, ...JSON.parse(sessionStorage.getItem("list") ?? "{}") };
+  let view = { ...structuredClone(FRESH), ...JSON.parse(sessionStorage.getItem("list") ?? "{}") };
   /** The files, by the id of the driver: `{ file, lists, sets, told, mistakes }`. */
   let files = new Map();
   /** The parts of the shown list as they were read, by the id of the driver. */
-  let read = new Map();
+  let read = new Map(JSON.parse(sessionStorage.getItem("list-read") ?? "[]"));
   /** The list without a name, while another one is shown. */
-  let own = FRESH;
+  let own = JSON.parse(sessionStorage.getItem("list-own") ?? "null") ?? FRESH;
   let folded = new Set();
   /** The number of changes of files, begun and ended: an answer from before one is out of date. */
   let changes = 0;
   let mayChange = false;
   let wanted = linked();
+  // After a reload the list is shown already, perhaps with changes.
+  if (wanted === view.name) wanted = null;
 
   /** The name of the list in the address, `/#list=NAME`. */
   function linked() {
@@ -43,31 +45,35 @@ const watch = (() => {
   function part(driver, name) {
     const pins = view.pins.filter((key) => id(key) === driver).map(nameOf);
     const own = Object.keys(view.formats).filter((key) => id(key) === driver).sort();
-    const isFirst = driver === [...files.keys()][0];
+    const isFirst = driver === [...files.keys()][0] && ![...read.keys()].some((it) => it !== driver);
     if (!pins.length && !own.length && !read.get(driver) && !isFirst) return null;
     return { name, pins, group: view.group, order: view.order, formats: Object.fromEntries(own.map((key) => [nameOf(key), view.formats[key]])) };
   }
 
-  /** The list as its parts are in the files. */
-  function joined(name) {
-    const parts = [...files].map(([driver, file]) => [driver, entry(file, name)]).filter(([, list]) => list);
+  const partsOf = (name) => [...files].map(([driver, file]) => [driver, entry(file, name)]).filter(([, list]) => list);
+
+  /** The list that consists of these parts. */
+  function joined(name, parts) {
     const { group, order } = parts[0][1];
     const pins = parts.flatMap(([driver, list]) => list.pins.map((pin) => `${driver}/${pin}`));
     const formats = Object.fromEntries(parts.flatMap(([driver, list]) => Object.entries(list.formats).map(([pin, format]) => [`${driver}/${pin}`, format])));
     return { name, pins, group, order, formats };
   }
 
-  const isChanged = () => view.name !== "" && [...files.keys()].some((driver) => !isSame(part(driver, view.name), read.get(driver) ?? null));
+  /** A list, so that two of them can be compared: the files have no order between pins of different drivers. */
+  const comparable = ({ pins, group, order, formats }) => [group, order, [...pins].sort((a, b) => id(a) - id(b)), Object.entries(formats).sort()];
+
+  const isChanged = () => view.name !== "" && files.size > 0 && (!read.size || !isSame(comparable(view), comparable(joined(view.name, [...read]))));
 
   /** Shows a named list; without a name, the one that has none. */
   function open(name) {
-    read = new Map();
-    if (!view.name) own = view;
+    if (!view.name) own = structuredClone(view);
     if (name) {
-      view = joined(name);
-      for (const [driver, file] of files) if (entry(file, name)) read.set(driver, entry(file, name));
+      read = new Map(partsOf(name));
+      view = joined(name, [...read]);
     } else {
-      view = own;
+      read = new Map();
+      view = structuredClone(own);
     }
     history.replaceState(null, "", `${location.pathname}${location.search}${name ? `#list=${encodeURIComponent(name)}` : ""}`);
     folded = new Set();
@@ -77,6 +83,8 @@ const watch = (() => {
 
   function changed() {
     sessionStorage.setItem("list", JSON.stringify(view));
+    sessionStorage.setItem("list-read", JSON.stringify([...read]));
+    sessionStorage.setItem("list-own", JSON.stringify(own));
     show();
     act.changed();
   }
@@ -126,11 +134,11 @@ const watch = (() => {
     }));
     const now = new Map(answers.flat());
     if (changes !== before || isSame([...now], [...files])) return;
-    const wasChanged = isChanged();
     files = now;
+    const wasChanged = isChanged();
     if (wanted !== null) return openWanted();
     const isThere = names().includes(view.name);
-    const parts = new Map([...files].map(([driver, file]) => [driver, entry(file, view.name)]).filter(([, list]) => list));
+    const parts = new Map(partsOf(view.name));
     if (isThere && !isSame([...parts], [...read])) {
       if (!read.size) {
         // After a reload, what was changed here and is not saved stays.
@@ -138,10 +146,16 @@ const watch = (() => {
       } else if (wasChanged) {
         act.say(`The list "${view.name}" has been changed in the file, and here as well: Revert shows that of the file.`, true);
       } else {
-        view = joined(view.name);
+        view = joined(view.name, [...parts]);
         read = parts;
         act.say(`The list "${view.name}" has been changed in the file, and is shown so.`);
       }
+    }
+    const isRead = (driver) => files.get(driver)?.mistakes.length === 0;
+    if (!isThere && read.size && [...read.keys()].every(isRead)) {
+      // Another page has removed the list.
+      read = new Map();
+      act.say(`The list "${view.name}" is no longer in the file; Save puts it there again.`, true);
     }
     changed();
   }
@@ -152,6 +166,10 @@ const watch = (() => {
   function openWanted() {
     const name = wanted;
     wanted = null;
+    if (mayChange && isChanged()) {
+      changed();
+      return sayUnsaved();
+    }
     if (names().includes(name)) return open(name);
     changed();
     act.say(`There is no list "${name}" here${names().length ? `; lists are ${names().map((it) => `"${it}"`).join(", ")}` : ""}.`, true);
@@ -216,10 +234,11 @@ const watch = (() => {
     act.say(`${signal.name} is number ${to + 1} of ${view.pins.length}.`);
   }
 
+  const sayUnsaved = () => act.say(`The changes of the list "${view.name}" are not saved: press Save or Revert first.`, true);
   get("watch-name").addEventListener("change", () => {
     if (!mayChange || !isChanged()) return open(get("watch-name").value);
     show();
-    act.say(`The changes of the list "${view.name}" are not saved: press Save or Revert first.`, true);
+    sayUnsaved();
   });
   get("watch-group").addEventListener("change", () => { view.group = get("watch-group").value; changed(); });
   get("watch-order").addEventListener("change", () => { view.order = get("watch-order").value; changed(); });
@@ -234,6 +253,7 @@ const watch = (() => {
   });
   window.addEventListener("hashchange", () => {
     wanted = linked();
+    if (wanted === view.name) wanted = null;
     if (wanted !== null) openWanted();
   });
 
@@ -258,7 +278,11 @@ const watch = (() => {
     fold(key) { if (!folded.delete(key)) folded.add(key); act.changed(); },
     access(isRight) { mayChange = isRight; show(); },
     /** Sets what the page does: `say(text, isBad)`, `changed()`, `opened(hasPins)`. */
-    begin(actions) { act = actions; show(); },
+    begin(actions) {
+      act = actions;
+      show();
+      if (view.name) act.opened(view.pins.length > 0);
+    },
     get files() { return files; },
     get group() { return view.group; },
     get order() { return view.order; },

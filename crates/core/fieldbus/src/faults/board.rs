@@ -83,6 +83,13 @@ impl FaultBoard {
         Ok((cell, over.map(|over| over.id())))
     }
 
+    /// The number of faults that can be added now.
+    pub fn room(&self) -> usize {
+        let cells = self.cells();
+        let taken = cells.iter().filter(|cell| cell.phase() != Phase::Over);
+        LIMIT.saturating_sub(taken.count())
+    }
+
     /// The simulation restarts: its next fault draws what its first one did.
     pub(super) fn restart(&self) {
         // No fault may get its number meanwhile.

@@ -174,10 +174,13 @@ pub(super) fn replaced<T: Entry>(text: &str, name: &str, is: Option<&T>) -> Resu
     let item = document
         .entry(T::KEY)
         .or_insert_with(|| Item::ArrayOfTables(ArrayOfTables::new()));
-    if item.is_array() {
-        *item = std::mem::take(item)
-            .into_array_of_tables()
-            .map_or(Item::None, Item::ArrayOfTables);
+    if let Some(array) = item.as_array() {
+        *item = if array.is_empty() {
+            Item::ArrayOfTables(ArrayOfTables::new())
+        } else {
+            let tables = std::mem::take(item).into_array_of_tables();
+            tables.map_or(Item::None, Item::ArrayOfTables)
+        };
     }
     let tables = item
         .as_array_of_tables_mut()

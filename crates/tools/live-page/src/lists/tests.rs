@@ -228,6 +228,16 @@ fn what_does_not_fit_is_refused_with_what_would() {
 }
 
 #[test]
+fn a_file_with_an_empty_array_takes_a_list() {
+    let folder = Folder::new(Some("# None yet.\nlist = []\nset = []\n"));
+    assert_eq!(folder.seen()["mistakes"], json!([]));
+    let new = list("B", &["Level"]);
+    folder.put("list", &Value::Null, &new).expect("saved");
+    assert_eq!(folder.seen()["lists"], json!([new]));
+    assert_eq!(folder.seen()["mistakes"], json!([]));
+}
+
+#[test]
 #[cfg(unix)]
 fn a_link_stays_and_what_it_names_is_written() {
     let folder = Folder::new(None);

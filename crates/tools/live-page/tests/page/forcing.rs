@@ -83,6 +83,20 @@ fn a_ramp_goes_evenly_from_the_present_value_and_is_held() {
 }
 
 #[test]
+fn a_ramp_that_has_not_begun_is_where_the_signal_is() {
+    let page = Page::open();
+    // Between two ticks there is time for two requests.
+    let pause = std::time::Duration::from_millis(300);
+    let simulation = Simulation::start_in(pause, &page, 1, "Cell", EVER);
+    simulation.pass(2);
+    assert_eq!(page.change("PUT /force/1/out", "100 within 4ms").0, 200);
+    let out = page.get("/signals")["drivers"][0]["signals"][1].clone();
+    assert_eq!((&out["forced"], &out["value"]), (&0.into(), &0.into()));
+    assert_eq!(page.change("PUT /force/1/out", "40 within 4ms").0, 200);
+    wait(&page, &[0.0, 10.0, 20.0, 30.0, 40.0]);
+}
+
+#[test]
 fn several_are_forced_and_released_in_one_tick_or_not_at_all() {
     let page = Page::open();
     let _simulation = started(&page);

@@ -113,14 +113,33 @@ fn a_list_is_made_by_hand_saved_beside_the_driver_and_shared_by_its_link() {
                  \"Valve\",\n    \"Level\",\n]\n\n[list.formats]\n\"Oven zone 2 heater\" = \"binary\"\n";
     assert!(text.ends_with(right), "{text}");
     assert_eq!(browser.run("return location.hash"), "#list=Level%20control");
-    assert_quiet(&browser);
-    // A viewer without the token opens the link, and changes only this tab.
     let page = machine
         .url
         .split('#')
         .next()
         .expect("an address")
         .to_owned();
+    // A change that is not saved stays when the page is loaded again.
+    set(&browser, "watch-order", "changed");
+    browser.go("about:blank");
+    browser.go(&format!("{page}#list=Level%20control"));
+    browser
+        .wait("watch.files.size === 1 && watch.order === 'changed' && watch.pinned().length === 3");
+    browser.wait("document.getElementById('watch-state').textContent === 'changed, not saved'");
+    click(&browser, "#watch-revert");
+    browser.wait(
+        "watch.order === 'file' && document.getElementById('watch-state').textContent === ''",
+    );
+    // The list without a name stays one when it is saved as a second list.
+    set(&browser, "watch-name", "");
+    browser.run("document.getElementById('watch-new').focus()");
+    browser.keys(&format!("second{ENTER}"));
+    wait_said(&browser, "The list \"second\" is saved in tank.lists.toml.");
+    set(&browser, "watch-name", "");
+    assert_eq!(browser.run("return watch.name"), "");
+    let text = fs::read_to_string(&file).expect("the file");
+    assert_quiet(&browser);
+    // A viewer without the token opens the link, and changes only this tab.
     let viewer = Browser::start(390, 844);
     viewer.go(&format!("{page}#list=Level%20control"));
     viewer.wait("watch.name === 'Level control' && list.kind === 'pinned'");

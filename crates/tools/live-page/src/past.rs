@@ -231,7 +231,14 @@ mod tests {
         while recording.next(&mut tick).expect("it is whole") {
             ticks.push(tick.clone());
         }
-        (columns.columns.iter().map(|it| it.title()).collect(), ticks)
+        (
+            columns
+                .columns
+                .iter()
+                .map(tickbus_record::Column::title)
+                .collect(),
+            ticks,
+        )
     }
 
     #[test]

@@ -27,8 +27,8 @@ const BELOW: i32 = 36;
 
 /// The free space beside a box for one cable, and for each further one, up to the widest.
 const BESIDE: i32 = 60;
-const PER_CABLE: i32 = 7;
-const WIDEST: i32 = 112;
+const PER_CABLE: i32 = 10;
+const WIDEST: i32 = 110;
 
 /// The height of a channel; page.css has the same.
 pub(crate) const ROW: i32 = 30;

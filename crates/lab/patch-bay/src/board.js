@@ -7,7 +7,7 @@ const board = (() => {
   const frames = document.getElementById('frames');
   const sheet = document.getElementById('sheet');
   const SVG = 'http://www.w3.org/2000/svg';
-  /** On a narrow screen boxes are in one column, in the order of their places. */
+  /** On a narrow screen boxes are in one column. */
   const narrow = matchMedia('(max-width: 640px)');
   /** The space around all boxes. */
   const MARGIN = { x: 54, y: 40 };
@@ -160,7 +160,6 @@ const board = (() => {
       const at = dragged.get(name) ?? lab.places.get(name) ?? { x: 0, y: 0 };
       box.element.style.setProperty('left', `${at.x + MARGIN.x}px`);
       box.element.style.setProperty('top', `${at.y + MARGIN.y}px`);
-      box.element.style.setProperty('order', Math.round(at.y / 40) * 40 + Math.round(at.x / 1000));
     }
     drawSoon();
   }

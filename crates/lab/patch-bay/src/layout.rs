@@ -24,8 +24,8 @@ const MANY: usize = 50;
 const MOST: usize = 20_000;
 
 /// The sizes of a box, in pixels; page.css has the same.
-const WIDTH: i32 = 208;
-const NAMED_WIDTH: i32 = 352;
+const WIDTH: i32 = 210;
+const NAMED_WIDTH: i32 = 350;
 const HEADER: i32 = 44;
 const PADDING: i32 = 10;
 

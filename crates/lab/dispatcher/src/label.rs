@@ -18,7 +18,7 @@ impl Label {
         (is_right && !text.contains(is_unfit)).then(|| Self(text.into()))
     }
 
-    /// The label `text`; blanks at its ends do not count. `None` if it is none.
+    /// The label `text`; blanks at its ends do not count. `None` if that is no label.
     pub fn read_text(text: &str) -> Option<Self> {
         Self::read(text.as_bytes())
     }

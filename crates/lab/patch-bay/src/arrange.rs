@@ -19,6 +19,9 @@ pub(crate) struct Spot {
 /// The width to which groups of connected boxes are placed beside each other.
 const SHEET: i32 = 1340;
 
+/// With more boxes than this the sheet is twice as wide.
+const CROWD: usize = 60;
+
 /// A column that is higher is divided.
 const HIGHEST: i32 = 1400;
 
@@ -39,10 +42,15 @@ const SWEEPS: usize = 6;
 /// Places all boxes. `links` are pairs of a source and what it feeds.
 pub(crate) fn arrange(sizes: &[Size], links: &[(usize, usize)]) -> Vec<Spot> {
     let mut spots = vec![Spot { x: 0, y: 0 }; sizes.len()];
+    let sheet = if sizes.len() > CROWD {
+        2 * SHEET
+    } else {
+        SHEET
+    };
     let (mut x, mut y, mut row) = (0, 0, 0);
     for part in parts(sizes.len(), links) {
         let extent = arrange_part(&part, sizes, links, &mut spots);
-        if x > 0 && x + extent.width > SHEET {
+        if x > 0 && x + extent.width > sheet {
             (x, y, row) = (0, y + row + BELOW, 0);
         }
         for at in part {

@@ -10,7 +10,7 @@ const board = (() => {
   /** On a narrow screen boxes are in one column. */
   const narrow = matchMedia('(max-width: 640px)');
   /** The space around all boxes. */
-  const MARGIN = { x: 54, y: 40 };
+  const MARGIN = { x: 54, y: 56 };
   /** Boxes by the names of their clients: { element, title, isFolded, pins }. */
   const boxes = new Map();
   /** Drawn channels by their names: { element, text }. */

@@ -7,7 +7,7 @@ const matrix = (() => {
   const sheet = document.getElementById('matrix-sheet');
   /** The sizes of a cell, of the column with the inputs, and of the row with the outputs; page.css has the same. */
   const CELL = 28;
-  const SIDE = 240;
+  const side = () => (board.narrow.matches ? 130 : 240);
   const HEAD = 170;
   /** Cells beyond the visible ones that are drawn. */
   const SPARE = 4;
@@ -47,7 +47,7 @@ const matrix = (() => {
     at = { row: find(rows, row, at.row), column: find(columns, column, at.column) };
     grid.setAttribute('aria-rowcount', rows.length + 1);
     grid.setAttribute('aria-colcount', columns.length + 1);
-    sheet.style.setProperty('width', `${SIDE + columns.length * CELL}px`);
+    sheet.style.setProperty('width', `${side() + columns.length * CELL}px`);
     sheet.style.setProperty('height', `${HEAD + rows.length * CELL}px`);
     range = '';
     draw();
@@ -84,7 +84,7 @@ const matrix = (() => {
       head.title = shown(pin);
       head.setAttribute('aria-colindex', column + 2);
       head.dataset.column = column;
-      head.style.setProperty('left', `${SIDE + column * CELL}px`);
+      head.style.setProperty('left', `${side() + column * CELL}px`);
     }
     for (let row = top; row < bottom; row += 1) {
       const input = rows[row];
@@ -106,7 +106,7 @@ const matrix = (() => {
         cell.dataset.row = row;
         cell.dataset.column = column;
         cell.setAttribute('aria-colindex', column + 2);
-        cell.style.setProperty('left', `${SIDE + column * CELL}px`);
+        cell.style.setProperty('left', `${side() + column * CELL}px`);
         cell.classList.toggle('unfit', input.isAnalog !== output.isAnalog);
         cells.push({ element: cell, input, output });
       }
@@ -137,7 +137,7 @@ const matrix = (() => {
     at = { row: Math.max(0, Math.min(rows.length - 1, row)), column: Math.max(0, Math.min(columns.length - 1, column)) };
     const into = (scroll, size, head, place) => Math.min(place * CELL, Math.max(scroll, (place + 1) * CELL + head - size));
     grid.scrollTop = into(grid.scrollTop, grid.clientHeight, HEAD, at.row);
-    grid.scrollLeft = into(grid.scrollLeft, grid.clientWidth, SIDE, at.column);
+    grid.scrollLeft = into(grid.scrollLeft, grid.clientWidth, side(), at.column);
     draw();
   }
 

@@ -56,7 +56,7 @@ fn main() {
         .collect();
     times.sort_by(f64::total_cmp);
     println!("rust page.first_paint_ms {:.0}", times[times.len() / 2]);
-    // It has nothing to lose.
+    // The process has no data to save.
     let _ = machine.kill();
     let _ = machine.wait();
 }

@@ -86,7 +86,7 @@ fn main() {
     browser.run("analyser.all()");
     browser.wait("analyser.tracks.every(({ from, until, signal: { driver: { past } } }) => from <= past.first && until >= past.last)");
     println!("rust past.all_ms {}", begun.elapsed().as_millis());
-    // It has nothing to lose.
+    // The process has no data to save.
     let _ = show.kill();
     let _ = show.wait();
 }

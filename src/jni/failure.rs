@@ -5,7 +5,7 @@ use std::any::Any;
 use jni::errors::{Error, ErrorPolicy};
 use jni::objects::{JClass, JThrowable, JValue};
 use jni::refs::Global;
-use jni::{Env, jni_sig, jni_str};
+use jni::{Env, EnvUnowned, jni_sig, jni_str};
 use once_cell::sync::OnceCell;
 
 use tickbus_binding::{Refusal, panic_message};
@@ -48,6 +48,14 @@ pub(super) fn find_exception(env: &mut Env<'_>) -> Result<(), Error> {
 
 /// Throws `tickbus.FieldbusException`, unless an exception is pending already.
 pub(super) struct ThrowFieldbusException;
+
+/// Runs a native method: returns its result, or throws its failure.
+pub(super) fn answer<'local, R: Default + 'local>(
+    mut env: EnvUnowned<'local>,
+    work: impl FnOnce(&mut Env<'local>) -> Result<R, Failure>,
+) -> R {
+    env.with_env(work).resolve::<ThrowFieldbusException>()
+}
 
 impl<T: Default> ErrorPolicy<T, Failure> for ThrowFieldbusException {
     type Captures<'local: 'native, 'native> = ();

@@ -2,22 +2,14 @@
 
 #![allow(unsafe_code, reason = "exported names")]
 
+use jni::EnvUnowned;
 use jni::objects::{JClass, JString};
 use jni::sys::{jboolean, jlong};
-use jni::{Env, EnvUnowned};
 
 use tickbus_base::time::Nanos;
 
-use super::failure::{Failure, ThrowFieldbusException};
+use super::failure::answer;
 use crate::nets;
-
-/// Runs a native method: returns its result, or throws its failure.
-fn answer<'local, R: Default + 'local>(
-    mut env: EnvUnowned<'local>,
-    work: impl FnOnce(&mut Env<'local>) -> Result<R, Failure>,
-) -> R {
-    env.with_env(work).resolve::<ThrowFieldbusException>()
-}
 
 /// `static native long openNative(String address, String title)`
 #[unsafe(no_mangle)]

@@ -14,7 +14,7 @@ use tickbus_driver::{Code, Driver};
 use tickbus_image::signal::Slot;
 use tickbus_testing::Session;
 
-use super::failure::{Failure, ThrowFieldbusException};
+use super::failure::{Failure, answer};
 use super::with;
 
 /// How all verdicts are accepted under `JUnit`.
@@ -22,14 +22,6 @@ const ACCEPT: &str = "-Dtickbus.accept=true";
 
 /// The sweeps of this process.
 static SWEEPS: Handles<Box<Session>> = Handles::new();
-
-/// Runs a native method: returns its result, or throws its failure.
-fn answer<'local, R: Default + 'local>(
-    mut env: EnvUnowned<'local>,
-    work: impl FnOnce(&mut Env<'local>) -> Result<R, Failure>,
-) -> R {
-    env.with_env(work).resolve::<ThrowFieldbusException>()
-}
 
 fn visit<R>(sweep: jlong, work: impl FnOnce(&mut Session) -> R) -> Result<R, Failure> {
     Ok(SWEEPS.visit(sweep, |session| work(session))?)

@@ -36,7 +36,7 @@ enum Order {
     Batch(Box<Batch>),
 }
 
-/// Faults that begin in the same tick, in place of others that end in it.
+/// A request that faults begin, and others end, in the same tick.
 #[derive(Debug)]
 struct Batch {
     begin: Vec<Prepared>,

@@ -271,7 +271,7 @@ impl Layout {
     ///
     /// # Errors
     ///
-    /// What is wrong, and what would be right.
+    /// The body is wrong; the text says what would be right.
     pub(crate) fn change(&mut self, body: &str, number: u64) -> Result<(), String> {
         let shape =
             "write such as {\"PUMP\":{\"x\":40,\"y\":16,\"folded\":true,\"group\":\"Hall 1\"}}";

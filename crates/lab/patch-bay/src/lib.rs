@@ -3,6 +3,7 @@
 //! docs/dispatcher.md describes it, for users and for programs.
 
 mod arrange;
+mod assets;
 mod json;
 mod layout;
 mod layout_file;
@@ -19,86 +20,13 @@ use tickbus_base::toml_text::Mistakes;
 use tickbus_dispatcher::{Door, Number, Order, Pin, Reply};
 use tickbus_web::{Answer, Asset, Change, Outcome, Refused, Site, State, Verb};
 
+use crate::assets::ASSETS;
 use crate::layout::Layout;
 use crate::layout_file::LayoutFile;
 use crate::model::Shared;
 
 /// The longest description of a layout: that of thousands of boxes.
 const LONGEST_LAYOUT: usize = 4 << 20;
-
-/// The files of the page.
-const ASSETS: &[Asset] = &[
-    Asset {
-        path: "/",
-        kind: "text/html; charset=utf-8",
-        text: include_str!("page.html"),
-    },
-    Asset {
-        path: "/report.css",
-        kind: "text/css; charset=utf-8",
-        text: tickbus_report::STYLE,
-    },
-    Asset {
-        path: "/patch-bay.css",
-        kind: "text/css; charset=utf-8",
-        text: include_str!("page.css"),
-    },
-    Asset {
-        path: "/stream.js",
-        kind: "text/javascript; charset=utf-8",
-        text: tickbus_web::STREAM,
-    },
-    Asset {
-        path: "/client.js",
-        kind: "text/javascript; charset=utf-8",
-        text: tickbus_web::CLIENT,
-    },
-    Asset {
-        path: "/head.js",
-        kind: "text/javascript; charset=utf-8",
-        text: tickbus_web::HEAD,
-    },
-    Asset {
-        path: "/room.css",
-        kind: "text/css; charset=utf-8",
-        text: tickbus_web::STYLE,
-    },
-    Asset {
-        path: "/state.js",
-        kind: "text/javascript; charset=utf-8",
-        text: include_str!("state.js"),
-    },
-    Asset {
-        path: "/route.js",
-        kind: "text/javascript; charset=utf-8",
-        text: include_str!("route.js"),
-    },
-    Asset {
-        path: "/board.js",
-        kind: "text/javascript; charset=utf-8",
-        text: include_str!("board.js"),
-    },
-    Asset {
-        path: "/changes.js",
-        kind: "text/javascript; charset=utf-8",
-        text: include_str!("changes.js"),
-    },
-    Asset {
-        path: "/layout.js",
-        kind: "text/javascript; charset=utf-8",
-        text: include_str!("layout.js"),
-    },
-    Asset {
-        path: "/matrix.js",
-        kind: "text/javascript; charset=utf-8",
-        text: include_str!("matrix.js"),
-    },
-    Asset {
-        path: "/patch-bay.js",
-        kind: "text/javascript; charset=utf-8",
-        text: include_str!("page.js"),
-    },
-];
 
 /// The page of the dispatcher behind a door.
 #[derive(Clone, Debug)]

@@ -2,73 +2,38 @@
 
 use tickbus_web::Asset;
 
-const SCRIPT: &str = "text/javascript; charset=utf-8";
-const STYLE: &str = "text/css; charset=utf-8";
-
 /// The page itself, its styles and its scripts; files shared with the report and the room come from there.
 pub(crate) const ASSETS: &[Asset] = &[
-    Asset {
-        path: "/",
-        kind: "text/html; charset=utf-8",
-        text: include_str!("page.html"),
-    },
-    Asset {
-        path: "/report.css",
-        kind: STYLE,
-        text: tickbus_report::STYLE,
-    },
-    Asset {
-        path: "/live.css",
-        kind: STYLE,
-        text: include_str!("page.css"),
-    },
-    Asset {
-        path: "/analyser.css",
-        kind: STYLE,
-        text: include_str!("analyser.css"),
-    },
-    Asset {
-        path: "/views.css",
-        kind: STYLE,
-        text: include_str!("views.css"),
-    },
-    script("/stream.js", tickbus_web::STREAM),
-    script("/client.js", tickbus_web::CLIENT),
-    script("/head.js", tickbus_web::HEAD),
-    Asset {
-        path: "/room.css",
-        kind: STYLE,
-        text: tickbus_web::STYLE,
-    },
-    script("/lookup.js", tickbus_report::LOOKUP),
-    script("/draw.js", tickbus_report::DRAW),
-    script("/elements.js", tickbus_web::ELEMENTS),
-    script("/signals.js", include_str!("signals.js")),
-    script("/trend.js", include_str!("trend.js")),
-    script("/views.js", include_str!("views.js")),
-    script("/watch.js", include_str!("watch.js")),
-    script("/sets.js", include_str!("sets.js")),
-    script("/rows.js", include_str!("rows.js")),
-    script("/format.js", include_str!("format.js")),
-    script("/list.js", include_str!("list.js")),
-    script("/outage.js", include_str!("outage.js")),
-    script("/line.js", include_str!("line.js")),
-    script("/picture.js", include_str!("picture.js")),
-    script("/touch.js", include_str!("touch.js")),
-    script("/pads.js", include_str!("pads.js")),
-    script("/bar.js", include_str!("bar.js")),
-    script("/trigger.js", include_str!("trigger.js")),
-    script("/analyser.js", include_str!("analyser.js")),
-    script("/live.js", include_str!("live.js")),
+    Asset::page(include_str!("page.html")),
+    Asset::style("/report.css", tickbus_report::STYLE),
+    Asset::style("/live.css", include_str!("page.css")),
+    Asset::style("/analyser.css", include_str!("analyser.css")),
+    Asset::style("/views.css", include_str!("views.css")),
+    Asset::script("/stream.js", tickbus_web::STREAM),
+    Asset::script("/client.js", tickbus_web::CLIENT),
+    Asset::script("/head.js", tickbus_web::HEAD),
+    Asset::style("/room.css", tickbus_web::STYLE),
+    Asset::script("/lookup.js", tickbus_report::LOOKUP),
+    Asset::script("/draw.js", tickbus_report::DRAW),
+    Asset::script("/elements.js", tickbus_web::ELEMENTS),
+    Asset::script("/signals.js", include_str!("signals.js")),
+    Asset::script("/trend.js", include_str!("trend.js")),
+    Asset::script("/views.js", include_str!("views.js")),
+    Asset::script("/watch.js", include_str!("watch.js")),
+    Asset::script("/sets.js", include_str!("sets.js")),
+    Asset::script("/rows.js", include_str!("rows.js")),
+    Asset::script("/format.js", include_str!("format.js")),
+    Asset::script("/list.js", include_str!("list.js")),
+    Asset::script("/outage.js", include_str!("outage.js")),
+    Asset::script("/line.js", include_str!("line.js")),
+    Asset::script("/picture.js", include_str!("picture.js")),
+    Asset::script("/touch.js", include_str!("touch.js")),
+    Asset::script("/pads.js", include_str!("pads.js")),
+    Asset::script("/bar.js", include_str!("bar.js")),
+    Asset::script("/trigger.js", include_str!("trigger.js")),
+    Asset::script("/analyser.js", include_str!("analyser.js")),
+    Asset::script("/live.js", include_str!("live.js")),
 ];
-
-const fn script(path: &'static str, text: &'static str) -> Asset {
-    Asset {
-        path,
-        kind: SCRIPT,
-        text,
-    }
-}
 
 #[cfg(test)]
 mod tests {

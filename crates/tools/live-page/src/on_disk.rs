@@ -60,7 +60,7 @@ impl OnDisk {
         &self.known
     }
 
-    /// True if there was a file, and is none at the moment.
+    /// True if the file existed before, and does not exist now.
     pub fn is_missing(&self) -> bool {
         self.seen.is_some() && !self.path.exists()
     }
@@ -94,7 +94,7 @@ impl OnDisk {
     ///
     /// The file has another text by now, or the system refused to write it; it is then as it was.
     pub fn write(&mut self, text: &str) -> Result<(), Unwritten> {
-        // Two changes within the resolution of the file's time are told apart by the text.
+        // Two changes can have the same file time: only the text tells them apart.
         match self.read() {
             Ok(Some(theirs)) => return Err(Unwritten::Changed(theirs)),
             // Others may have changed what cannot be read, such as a text in another encoding.

@@ -2,47 +2,13 @@
 
 use tickbus_web::Asset;
 
-const SCRIPT: &str = "text/javascript; charset=utf-8";
-
 pub(crate) const ASSETS: &[Asset] = &[
-    Asset {
-        path: "/",
-        kind: "text/html; charset=utf-8",
-        text: include_str!("studio.html"),
-    },
-    Asset {
-        path: "/studio.css",
-        kind: "text/css; charset=utf-8",
-        text: include_str!("studio.css"),
-    },
-    Asset {
-        path: "/studio.js",
-        kind: SCRIPT,
-        text: include_str!("studio.js"),
-    },
-    Asset {
-        path: "/cells.js",
-        kind: SCRIPT,
-        text: include_str!("cells.js"),
-    },
-    Asset {
-        path: "/running.js",
-        kind: SCRIPT,
-        text: include_str!("running.js"),
-    },
-    Asset {
-        path: "/explore.js",
-        kind: SCRIPT,
-        text: include_str!("explore.js"),
-    },
-    Asset {
-        path: "/tags.js",
-        kind: SCRIPT,
-        text: include_str!("tags.js"),
-    },
-    Asset {
-        path: "/bus.js",
-        kind: SCRIPT,
-        text: include_str!("bus.js"),
-    },
+    Asset::page(include_str!("studio.html")),
+    Asset::style("/studio.css", include_str!("studio.css")),
+    Asset::script("/studio.js", include_str!("studio.js")),
+    Asset::script("/cells.js", include_str!("cells.js")),
+    Asset::script("/running.js", include_str!("running.js")),
+    Asset::script("/explore.js", include_str!("explore.js")),
+    Asset::script("/tags.js", include_str!("tags.js")),
+    Asset::script("/bus.js", include_str!("bus.js")),
 ];

@@ -61,6 +61,35 @@ pub struct Asset {
     pub text: &'static str,
 }
 
+impl Asset {
+    /// The page itself, at `/`.
+    pub const fn page(text: &'static str) -> Self {
+        Self {
+            path: "/",
+            kind: "text/html; charset=utf-8",
+            text,
+        }
+    }
+
+    /// A script.
+    pub const fn script(path: &'static str, text: &'static str) -> Self {
+        Self {
+            path,
+            kind: "text/javascript; charset=utf-8",
+            text,
+        }
+    }
+
+    /// A style sheet.
+    pub const fn style(path: &'static str, text: &'static str) -> Self {
+        Self {
+            path,
+            kind: "text/css; charset=utf-8",
+            text,
+        }
+    }
+}
+
 /// A tab of a page.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Tab {

@@ -140,7 +140,7 @@ fn a_ramp_goes_evenly_to_its_end_whatever_the_type() {
     }
     end.set(1, 100.0);
     let seen = [(); 6].map(|()| {
-        // What the simulation writes meanwhile changes nothing.
+        // The simulation writes other values meanwhile, which change nothing.
         let sent = end.tick(nothing)[1];
         end.set(1, 7.0);
         (sent, i64::MAX - end.slots[3].signed(), end.slots[4].real())

@@ -220,7 +220,7 @@ impl<R: BufRead> ForeignReader<R> {
                 time = Some(next);
                 self.at = self.nanos(next)?;
             } else if let Some(command) = word.strip_prefix('$') {
-                // What is between these and $end are values.
+                // Values stand between these words and $end.
                 if !matches!(
                     command,
                     "dumpvars" | "dumpall" | "dumpon" | "dumpoff" | "end"

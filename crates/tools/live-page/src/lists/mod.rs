@@ -44,7 +44,8 @@ struct Set {
     values: Vec<(String, String)>,
 }
 
-/// A change of one list or set: how the page has it, and how it is to be; `null` if there is none.
+/// A change of one list or set: the value that the page knows, and the new value; `null` means that the list or set does
+/// not exist.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Replace<T> {

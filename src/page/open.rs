@@ -129,16 +129,19 @@ pub(crate) fn show(
     let any = "listen = \"127.0.0.1:0\" in [page], or --page 127.0.0.1:0,";
     let token = wanted.token_file.as_ref();
     let token = token.map(|file| config.folder().join(file));
-    let open = open(&config.name, (&wanted.listen, any), token.as_deref())?;
-    if wanted.listens_here() && !open.is_here {
-        return Err(PageError::WrongInput(format!(
+    let fits = |open: &Open| {
+        if !wanted.listens_here() || open.is_here {
+            return Ok(());
+        }
+        Err(PageError::WrongInput(format!(
             "{}: [page] listens on {} alone, and this process serves its pages on {} already; open this driver first, or \
              give the other pages 127.0.0.1",
             config.path.display(),
             wanted.listen,
             open.asked
-        )));
-    }
+        )))
+    };
+    let open = open(&config.name, (&wanted.listen, any), token.as_deref(), fits)?;
     let (live, is_new) = open.live()?;
     let Some(watch) = (shown.watch)() else {
         return Ok(None);
@@ -229,7 +232,7 @@ pub(crate) fn show_run(
     controls: Controls,
     announce: impl FnOnce(&str, &str),
 ) -> Result<Place, PageError> {
-    let open = open(name, (listen, "--page 127.0.0.1:0"), None)?;
+    let open = open(name, (listen, "--page 127.0.0.1:0"), None, |_| Ok(()))?;
     let (live, is_new) = open.live()?;
     let member = live.page.join_run(name, controls);
     if is_new {
@@ -260,7 +263,7 @@ type HeldNets = (Arc<Tab<NetPage>>, Arc<Open>);
 /// Shows nets on a page, which is served at `listen` unless this process has pages already.
 #[cfg(feature = "doors")]
 pub(crate) fn show_nets(title: &str, listen: &Address) -> Result<NetsPlace, PageError> {
-    let open = open(title, (listen, "127.0.0.1:0"), None)?;
+    let open = open(title, (listen, "127.0.0.1:0"), None, |_| Ok(()))?;
     let (tab, _) = tab(&open.nets, || {
         let page = NetPage::new(Monotonic::shared());
         let joined = open.pages.join(Page::new("Nets", "/nets", page.site()));
@@ -317,7 +320,12 @@ pub(crate) fn show_recording(
     listen: &Address,
     announce: impl FnOnce(&str, &str),
 ) -> Result<Place, PageError> {
-    let open = open("recording", (listen, "--page 127.0.0.1:0"), None)?;
+    let open = open(
+        "recording",
+        (listen, "--page 127.0.0.1:0"),
+        None,
+        |_| Ok(()),
+    )?;
     let (live, _) = open.live()?;
     let member = live.page.join_recording(recorded);
     // Nothing can be forced, so nobody needs the token.
@@ -337,9 +345,11 @@ fn open(
     name: &str,
     (asked, any): (&Address, &str),
     token_file: Option<&Path>,
+    fits: impl FnOnce(&Open) -> Result<(), PageError>,
 ) -> Result<Arc<Open>, PageError> {
     let mut present = present();
     if let Some(open) = present.upgrade() {
+        fits(&open)?;
         if open.asked != *asked {
             log::warn!(
                 "\"{name}\" asks for a page at {asked}, and is shown on that of this process, at {}",

@@ -29,7 +29,7 @@ pub struct Nets {
     id: u64,
 }
 
-/// True if a state is wanted.
+/// The answer to a program that asks if a state is wanted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wanted {
     /// Nobody looks, or the last state is too young.

@@ -397,7 +397,8 @@ fn the_drawings_of_the_demos_have_buttons_and_switches_that_work() {
         let root = "document.querySelector('.picture > div > div')?.shadowRoot";
         for control in controls {
             let (signal, kind) = control.rsplit_once(", ").expect("its kind");
-            let script = format!("{root}?.querySelector('[aria-label={}]')", json!(control));
+            // The label begins with what is written on the control, if that is something else.
+            let script = format!("{root}?.querySelector('[aria-label$={}]')", json!(control));
             browser.wait(&script);
             let found = browser.run(&format!(
                 "const box = {script}.querySelector('text').getBoundingClientRect(); \

@@ -222,7 +222,15 @@ fn seven_tabs_on_three_pages_share_one_stream() {
     }
     // A browser has six connections to one host: the seventh tab gets no answer, and the first one no events, if each has one.
     let tabs = "[...document.querySelectorAll('#tabs a')].map((tab) => tab.textContent)";
-    let names = json!(["Live page", "Studio", "Board", "Count"]);
+    let names = json!([
+        "Overview",
+        "Signals",
+        "Line",
+        "Recording",
+        "Studio",
+        "Board",
+        "Count"
+    ]);
     assert_eq!(browser.run(&format!("return {tabs}")), names);
     browser.first_tab();
     let _fan = fixture.plug("FAN");
@@ -235,7 +243,14 @@ fn seven_tabs_on_three_pages_share_one_stream() {
 
     // A page that leaves takes its tab along, without a reload.
     drop(joined);
-    let fewer = json!(["Live page", "Studio", "Board"]);
+    let fewer = json!([
+        "Overview",
+        "Signals",
+        "Line",
+        "Recording",
+        "Studio",
+        "Board"
+    ]);
     browser.wait(&format!("JSON.stringify({tabs}) === '{fewer}'"));
     assert_quiet(&browser);
 }
@@ -246,17 +261,25 @@ fn the_tabs_lead_from_page_to_page_with_the_same_head() {
     let _pump = fixture.plug("PUMP");
     let browser = Browser::start(1280, 800);
     browser.go(&fixture.url);
-    for (at, page, title) in [
-        (1, "/studio", "driver.cfg"),
-        (0, "/", "Rig"),
-        (2, "/board", "Patch bay"),
+    for (to, title) in [
+        ("/studio", "driver.cfg"),
+        ("/#signals", "Rig"),
+        ("/#line", "Rig"),
+        ("/board", "Patch bay"),
+        ("/", "Rig"),
+        ("/board", "Patch bay"),
     ] {
-        browser.wait("document.querySelectorAll('#tabs a').length === 3");
-        click(&browser, &format!("#tabs a:nth-child({})", at + 1));
-        browser.wait(&format!("location.pathname === '{page}'"));
+        let tab = format!("#tabs [href=\"{to}\"]");
+        browser.wait(&format!("document.querySelector('{tab}')"));
+        click(&browser, &tab);
+        browser.wait(&format!("location.pathname + location.hash === '{to}'"));
+        let page = to.split('#').next().expect("a path");
         wait_page(&browser, page);
-        let current = "[...document.querySelectorAll('#tabs a')].findIndex((tab) => tab.ariaCurrent === 'page')";
-        browser.wait(&format!("{current} === {at}"));
+        let current =
+            "[...document.querySelectorAll('#tabs a')].filter((tab) => tab.ariaCurrent === 'page')";
+        browser.wait(&format!(
+            "{current}.map((tab) => tab.pathname + tab.hash).join() === '{to}'"
+        ));
         browser.wait(&format!(
             "document.getElementById('title').textContent === '{title}'"
         ));

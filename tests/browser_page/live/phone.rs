@@ -45,7 +45,7 @@ fn turn(browser: &Browser, width: u32, height: u32) {
 
 fn show(browser: &Browser, view: &str) {
     browser.run(&format!(
-        "document.querySelector('#views [data-view={view}]').click()"
+        "document.querySelector('#tabs [href=\"/#{view}\"]').click()"
     ));
     browser.wait(&format!("document.body.dataset.view === '{view}'"));
 }
@@ -196,10 +196,11 @@ fn each_view_has_an_address_and_no_change_of_view_loses_the_focus() {
         json!(["overview", ""])
     );
     // By a click, by the address, and back.
-    browser.run("document.querySelector('#views [data-view=machine]').focus()");
+    browser.wait("document.querySelector('#tabs [href=\"/#machine\"]')");
+    browser.run("document.querySelector('#tabs [href=\"/#machine\"]').focus()");
     browser.keys(super::ENTER);
     browser.wait("document.body.dataset.view === 'machine'");
-    let focus = "return document.activeElement.dataset.view ?? document.activeElement.id";
+    let focus = "return document.activeElement.hash?.slice(1) ?? document.activeElement.id";
     assert_eq!(browser.run(focus), "machine");
     let share = browser.run("return document.querySelector('.picture').shadowRoot === null && document.querySelector('.picture > div').clientWidth / innerWidth");
     assert!(share.as_f64() > Some(0.9), "the whole width: {share}");

@@ -338,6 +338,7 @@
     may: "may force",
     mayNot: "Open the address that was printed, with its token, to force a signal",
     lost: "No connection to the simulation.",
+    tabs: views.tabs,
     link: () => (isRecording() ? ["recording", ""] : bar.moment ? ["paused", "stale"] : null),
     news(text) {
       const { isOther, isLine } = plant.hear(text);

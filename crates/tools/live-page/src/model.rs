@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use tickbus_base::time::Nanos;
@@ -25,6 +26,14 @@ pub(crate) struct Model {
     now: Nanos,
     /// By their ids.
     drivers: BTreeMap<i32, Box<dyn Exhibit>>,
+    has: Arc<Has>,
+}
+
+/// The views that are not empty, for the tabs: those who read them do not wait for the model.
+#[derive(Debug, Default)]
+pub(crate) struct Has {
+    pub(crate) picture: AtomicBool,
+    pub(crate) past: AtomicBool,
 }
 
 impl Model {
@@ -53,6 +62,14 @@ impl Model {
         for driver in self.drivers.values_mut() {
             driver.sheet_mut().forget_line();
         }
+        let has_picture = self.drivers().any(|driver| driver.picture().is_some());
+        self.has.picture.store(has_picture, Relaxed);
+        let has_past = self.drivers().any(|driver| driver.archive().is_some());
+        self.has.past.store(has_past, Relaxed);
+    }
+
+    pub(crate) fn has(&self) -> Arc<Has> {
+        Arc::clone(&self.has)
     }
 
     pub(crate) fn drivers(&self) -> impl Iterator<Item = &dyn Exhibit> {

@@ -3,18 +3,19 @@
 use std::fmt;
 use std::io;
 use std::sync::Arc;
+use std::sync::atomic::Ordering::Relaxed;
 use std::thread::{self, JoinHandle};
 
 use tickbus_base::time::{Clock, system_time};
 use tickbus_driver::Watch;
 use tickbus_virtual_time::Controls;
-use tickbus_web::{Answer, Asset, Change, Document, Outcome, Site, State};
+use tickbus_web::{Answer, Asset, Change, Document, Outcome, Site, State, Tab};
 
 use crate::assets::ASSETS;
 use crate::exhibit::Exhibit;
 use crate::keeper::{Inbox, Keeper, Wish};
 use crate::lists::LARGEST;
-use crate::model::Shared;
+use crate::model::{Has, Shared};
 use crate::options::Options;
 use crate::past::{Door, Past};
 use crate::recorded::{Recorded, ShownRecording};
@@ -75,7 +76,11 @@ impl LivePage {
 
     /// The site that the room serves.
     pub fn site(&self) -> Arc<dyn Site> {
-        Arc::new(LiveSite(Arc::clone(&self.inbox), self.door.clone()))
+        Arc::new(LiveSite {
+            inbox: Arc::clone(&self.inbox),
+            door: self.door.clone(),
+            has: self.model.with(|model| model.has()),
+        })
     }
 
     /// Shows a driver, or a PLC program, until the returned value is dropped.
@@ -132,7 +137,11 @@ impl Drop for Member {
 }
 
 /// The page, as the room serves it.
-struct LiveSite(Arc<Inbox>, Door);
+struct LiveSite {
+    inbox: Arc<Inbox>,
+    door: Door,
+    has: Arc<Has>,
+}
 
 impl Site for LiveSite {
     fn assets(&self) -> &[Asset] {
@@ -140,14 +149,14 @@ impl Site for LiveSite {
     }
 
     fn look(&self, answer: Answer<State>) {
-        self.0.put(Wish::Look(answer));
+        self.inbox.put(Wish::Look(answer));
     }
 
     fn get(&self, path: &str, answer: Answer<Option<Document>>) {
         if Door::leads_to(path) {
-            self.1.ask(path, answer);
+            self.door.ask(path, answer);
         } else {
-            self.0.put(Wish::Get(path.to_owned(), answer));
+            self.inbox.put(Wish::Get(path.to_owned(), answer));
         }
     }
 
@@ -164,13 +173,28 @@ impl Site for LiveSite {
 
     fn change(&self, change: Change, answer: Answer<Outcome>) {
         if Door::leads_to(&change.path) {
-            self.1.change(change, answer);
+            self.door.change(change, answer);
         } else {
-            self.0.put(Wish::Change(change, answer));
+            self.inbox.put(Wish::Change(change, answer));
         }
     }
 
+    fn tabs(&self) -> Vec<Tab> {
+        let views = [
+            ("Overview", "", true),
+            ("Machine", "#machine", self.has.picture.load(Relaxed)),
+            ("Signals", "#signals", true),
+            ("Line", "#line", true),
+            ("Recording", "#recording", self.has.past.load(Relaxed)),
+        ];
+        let tab = |(name, fragment, _): (&str, &str, bool)| Tab {
+            name: name.to_owned(),
+            fragment: fragment.to_owned(),
+        };
+        views.into_iter().filter(|view| view.2).map(tab).collect()
+    }
+
     fn heard(&self, viewers: usize) {
-        self.0.put(Wish::Heard(viewers));
+        self.inbox.put(Wish::Heard(viewers));
     }
 }

@@ -1,17 +1,16 @@
 "use strict";
 
-// The views of the page: the overview, or one thing at a time over the whole window. The address has the view behind "#".
+// The views of the page: the overview, or one thing at a time over the whole window. The address has the view behind "#",
+// and each has a tab in the head.
 
 const views = (() => {
   /** A phone, upright or on its side, has room for one thing at a time. */
   const phone = matchMedia("(max-width: 700px), (max-height: 479px)");
-  const nav = document.getElementById("views");
-  const links = [...nav.children];
-  const NAMES = links.map(({ dataset }) => dataset.view);
   let act = { shown() {} };
-  /** The view that the address asks for, and the one that is shown. */
+  /** The view that the address asks for, the one that is shown, and all that have a tab. */
   let asked = "";
   let now = "";
+  let offered = "";
 
   const has = {
     overview: () => !phone.matches,
@@ -20,6 +19,10 @@ const views = (() => {
     line: () => true,
     recording: () => plant.drivers.some(({ past }) => past),
   };
+
+  const NAMES = Object.keys(has);
+  const fragmentOf = (view) => (view === "overview" ? "" : `#${view}`);
+  const viewOf = (fragment) => fragment.slice(1) || "overview";
 
   const usual = () => (has.overview() ? "overview" : has.machine() ? "machine" : "signals");
 
@@ -34,22 +37,22 @@ const views = (() => {
 
   /** Shows the view that the address asks for, if the page has it. */
   function redraw() {
-    for (const link of links) {
-      const isHidden = !has[link.dataset.view]();
-      if (link.hidden !== isHidden) link.hidden = isHidden;
-    }
     const view = has[asked]?.() ? asked : usual();
-    if (view === now) return;
-    now = view;
-    document.body.dataset.view = view;
-    document.body.classList.toggle("is-single", view !== "overview");
-    for (const link of links) {
-      if (link.dataset.view === view) link.setAttribute("aria-current", "page");
-      else link.removeAttribute("aria-current");
-    }
-    document.getElementById("times").role = view === "recording" ? "main" : null;
+    const shown = NAMES.filter((name) => has[name]()).join();
+    if (view === now && shown === offered) return;
+    const isOther = view !== now;
+    [now, offered] = [view, shown];
+    head.mark();
+    if (isOther) change();
+  }
+
+  /** Lays the page out for another view. */
+  function change() {
+    document.body.dataset.view = now;
+    document.body.classList.toggle("is-single", now !== "overview");
+    document.getElementById("times").role = now === "recording" ? "main" : null;
     document.getElementById("left").scrollTop = 0;
-    if (view === "line") for (const events of document.querySelectorAll(".events")) events.open = true;
+    if (now === "line") for (const events of document.querySelectorAll(".events")) events.open = true;
     // The focus must not stay on what is no longer shown.
     if (document.activeElement?.checkVisibility() === false) focus();
     act.shown();
@@ -58,24 +61,17 @@ const views = (() => {
   function go(view) {
     asked = view;
     const path = location.pathname + location.search;
-    history.pushState(null, "", view === "overview" ? path : `${path}#${view}`);
+    history.pushState(null, "", path + fragmentOf(view));
     redraw();
   }
 
   /** Gives the focus to the list, or to the tab of a view without it. */
   function focus() {
     const own = document.getElementById("list");
-    const to = own.checkVisibility() ? own : links.find(({ dataset }) => dataset.view === now);
-    to.focus({ preventScroll: true });
+    const to = own.checkVisibility() ? own : document.querySelector("#tabs [aria-current]");
+    to?.focus({ preventScroll: true });
   }
 
-  nav.addEventListener("click", (event) => {
-    const view = event.target.closest("a")?.dataset.view;
-    if (!view || event.ctrlKey || event.metaKey || event.shiftKey) return;
-    // Following the link itself would take the focus from it.
-    event.preventDefault();
-    if (view !== now) go(view);
-  });
   window.addEventListener("popstate", read);
   phone.addEventListener("change", redraw);
   /** On a phone the rows come first, and the tools of the list are folded. */
@@ -85,6 +81,12 @@ const views = (() => {
 
   return {
     redraw, focus,
+    /** The tabs of the head. */
+    tabs: {
+      now: () => fragmentOf(now),
+      has: (fragment) => has[viewOf(fragment)]?.() ?? true,
+      go(fragment) { if (viewOf(fragment) !== now) go(viewOf(fragment)); },
+    },
     /** Shows a view, unless the overview shows it already. */
     reveal(view) { if (now !== "overview" && now !== view) go(view); },
     /** Sets what the page does after another view is shown. */

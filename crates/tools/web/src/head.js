@@ -34,14 +34,18 @@ const head = (() => {
   top.prepend(title, nav, state);
   top.append(alarms);
 
-  /** Marks the tab of this page; a page with several tabs has one for each fragment of its address. */
+  const here = room.base || "/";
+  /** True for a tab of this page; a page with several tabs has one for each fragment of its address. */
+  const same = (path) => path.split("#")[0] === here;
+
+  /** Marks the tab of this page. */
   function mark() {
-    const here = room.base || "/";
-    const same = (path) => path.split("#")[0] === here;
     // The path of the only studio leads to the studio of a driver, too.
     const near = (path) => path !== "/" && here !== "/" && (`${path}/`.startsWith(`${here}/`) || `${here}/`.startsWith(`${path}/`));
-    const current = paths.find((path) => path === here + location.hash) ?? paths.find(same) ?? paths.find(near);
+    const fragment = words.tabs?.now() ?? location.hash;
+    const current = paths.find((path) => path === here + fragment) ?? paths.find(same) ?? paths.find(near);
     for (const [i, tab] of [...nav.children].entries()) {
+      tab.hidden = words.tabs !== undefined && same(paths[i]) && !words.tabs.has(paths[i].slice(here.length));
       if (paths[i] === current) tab.setAttribute("aria-current", "page");
       else tab.removeAttribute("aria-current");
     }
@@ -54,9 +58,17 @@ const head = (() => {
     paths = pages.map(({ path }) => path);
     nav.replaceChildren(...pages.map(({ path, name }) => make("a", "", { href: path, textContent: name })));
     // The only tab is the way out of a page that has left.
-    nav.hidden = pages.length === 0 || (pages.length === 1 && paths[0].split("#")[0] === (room.base || "/"));
+    nav.hidden = pages.length === 0 || (pages.length === 1 && same(paths[0]));
     mark();
   }
+
+  nav.addEventListener("click", (event) => {
+    const path = paths[[...nav.children].indexOf(event.target.closest("a"))];
+    if (!path || !words.tabs || !same(path) || event.ctrlKey || event.metaKey || event.shiftKey) return;
+    // Following the link itself would take the focus from it.
+    event.preventDefault();
+    words.tabs.go(path.slice(here.length));
+  });
 
   /** Shows the connection: by the page's own words while it is there. */
   function showLink() {
@@ -87,7 +99,8 @@ const head = (() => {
   /**
    * Listens to the room as `room.listen` does, and shows the connection and the access in the head. The page gives its words:
    * `may` for access with the token and `mayNot` for the way to get it, `lost` for a lost connection, and `link`, if it has
-   * other states than "live".
+   * other states than "live". A page with several tabs has `tabs`: `now()` is the fragment of the address of the one that is
+   * shown, `has(fragment)` is false for one that is empty, and `go(fragment)` shows one.
    */
   function listen(listener) {
     words = listener;
@@ -119,6 +132,8 @@ const head = (() => {
     alarm,
     count: (text) => write(counts, text),
     listen,
+    /** Marks the tab that is shown. */
+    mark,
     showLink,
     /** Writes the title of the page, and that of the browser's tab. */
     title(text, ofTab) {

@@ -36,7 +36,7 @@ pub trait Site: Send + Sync + 'static {
     }
 
     /// The tabs of this page, if it has several or other ones than that of the name with which it joined its room; asked
-    /// for by each viewer that comes.
+    /// for once a second.
     fn tabs(&self) -> Vec<Tab> {
         Vec::new()
     }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{END, Machine, open, wait_shown};
+use super::{END, ENTER, Machine, open, wait_shown};
 use crate::assert_quiet;
 
 /// `count` signals, half of them `%I` words and half `%Q` bits.
@@ -42,6 +42,18 @@ fn ten_thousand_signals_are_scrolled_filtered_and_chosen() {
     browser.keys(END);
     browser.wait("document.getElementById('chosen-name').textContent === 'Bit 4999'");
     browser.wait(&format!("{rows}.some((it) => it.parts.name.textContent === 'Bit 4999' && it.getAttribute('aria-selected') === 'true')"));
+    // At the lower edge its trend opens in sight, and the row stays in sight when the axis takes a part of the window.
+    let seen = |row: &str| {
+        format!(
+            "{rows}.concat(...document.querySelectorAll('.row.trend:not([hidden])')).some((it) => {row} && \
+             it.getBoundingClientRect().bottom <= document.getElementById('list').getBoundingClientRect().bottom + 1)"
+        )
+    };
+    browser.keys(ENTER);
+    browser.wait(&seen("it.classList.contains('trend')"));
+    browser.keys("a");
+    browser.wait("document.querySelectorAll('#tracks li').length === 1");
+    browser.wait(&seen("it.getAttribute('aria-selected') === 'true'"));
     browser.keys("/");
     browser.wait("document.activeElement.id === 'filter'");
     browser.keys("mm %iw9996");

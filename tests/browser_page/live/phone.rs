@@ -44,9 +44,10 @@ fn turn(browser: &Browser, width: u32, height: u32) {
 }
 
 fn show(browser: &Browser, view: &str) {
-    browser.run(&format!(
-        "document.querySelector('#tabs [href=\"/#{view}\"]').click()"
-    ));
+    let fragment = format!("#{view}").replace("#overview", "");
+    let tab = format!("document.querySelector('#tabs [href=\"/{fragment}\"]')");
+    browser.wait(&tab);
+    browser.run(&format!("{tab}.click()"));
     browser.wait(&format!("document.body.dataset.view === '{view}'"));
 }
 

@@ -320,6 +320,8 @@ const list = (() => {
     if (signal.isOpen) trend.close(signal);
     else trend.open(signal);
     choose();
+    // The trend would open below the edge of the list, unseen.
+    if (signal.isOpen && signal === chosen) find(signal, false);
   }
 
   /** Moves a pinned signal up or down among the pins, and keeps it in sight. */

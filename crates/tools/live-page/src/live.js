@@ -148,7 +148,7 @@
     },
     force: edit,
     release,
-    analyse: analyser.add,
+    analyse,
   });
   watch.begin({
     say,
@@ -189,7 +189,7 @@
     if (list.chosen?.isOpen) views.reveal("signals");
     showChosen(list.chosen);
   });
-  get("analyse").addEventListener("click", () => analyser.add(list.chosen));
+  get("analyse").addEventListener("click", () => analyse(list.chosen));
   get("pin").addEventListener("click", () => watch.pin(list.chosen));
   get("pin-up").addEventListener("click", () => list.moveOne(list.chosen, -1));
   get("pin-down").addEventListener("click", () => list.moveOne(list.chosen, 1));
@@ -288,6 +288,12 @@
     const isOther = now.forced !== counts.forced || now.failSafe !== counts.failSafe;
     counts = now;
     if (isOther && (list.kind === "forced" || list.kind === "failsafe")) list.choose();
+  }
+
+  function analyse(signal) {
+    analyser.add(signal);
+    // The axis may have taken the place of the signal's row.
+    if (signal && signal === list.chosen) list.find(signal, false);
   }
 
   function renew() {

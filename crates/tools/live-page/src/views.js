@@ -73,6 +73,8 @@ const views = (() => {
   }
 
   window.addEventListener("popstate", read);
+  // The browser looks for an element with the name of the view, and takes the focus away.
+  window.addEventListener("hashchange", () => { if (document.activeElement === document.body) focus(); });
   phone.addEventListener("change", redraw);
   /** On a phone the rows come first, and the tools of the list are folded. */
   const fold = () => { document.getElementById("watch-fold").open = !phone.matches; };

@@ -99,17 +99,22 @@ fn without_edit_a_page_has_no_studio() {
     for path in ["/studio/edit", "/studio/line", "/studio/of/7/line"] {
         assert_eq!(machine.ask(&format!("PUT {path}"), "take").0, 404, "{path}");
     }
-    assert_eq!(
-        machine.get("/tabs"),
-        json!([{ "name": "Live page", "path": "/" }])
-    );
+    let tabs = machine.get("/tabs");
+    let views = tabs.as_array().expect("a list").iter();
+    assert!(views.clone().count() > 1, "{tabs}");
+    for tab in views {
+        let path = tab["path"].as_str().expect("a path");
+        assert_eq!(path.split('#').next(), Some("/"), "{tabs}");
+    }
 }
 
 #[test]
 fn only_who_has_the_token_edits_and_no_other_site() {
     let text = machine("127.0.0.1:1");
     let machine = Edited::start(&text, &["--edit"]);
-    assert_eq!(machine.get("/tabs")[1]["path"], json!("/studio"));
+    let tabs = machine.get("/tabs");
+    let last = tabs.as_array().and_then(|tabs| tabs.last());
+    assert_eq!(last.expect("a tab")["path"], json!("/studio"));
     let edit = json!({ "text": { "was": 0, "to": "" } }).to_string();
     let foreign = format!(
         "Authorization: Bearer {}\r\nOrigin: http://evil.example\r\n",

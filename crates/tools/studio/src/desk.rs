@@ -5,8 +5,8 @@ use std::hash::{BuildHasher as _, Hasher as _};
 use std::path::Path;
 use std::sync::Arc;
 
+use diffy::{DiffOptions, PatchFormatter};
 use serde_json::{Value as Json, json};
-use similar::TextDiff;
 use tickbus_base::toml_text::{Key, Shape};
 use tickbus_driver_cfg::{Kinds, keys};
 use tickbus_live_page::{OnDisk, Unwritten};
@@ -389,9 +389,13 @@ fn diff(before: &str, now: &str) -> String {
     if before == now {
         return String::new();
     }
-    TextDiff::from_lines(before, now)
-        .unified_diff()
-        .context_radius(2)
-        .missing_newline_hint(false)
-        .to_string()
+    let patch = DiffOptions::new()
+        .set_context_len(2)
+        .create_patch(before, now);
+    let format = PatchFormatter::new()
+        .missing_newline_message(false)
+        .suppress_blank_empty(false);
+    let text = format.fmt_patch(&patch).to_string();
+    // Without the lines for the names of the files.
+    text.split_inclusive('\n').skip(2).collect()
 }

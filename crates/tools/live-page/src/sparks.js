@@ -10,9 +10,9 @@ const sparks = (() => {
   const PAUSE = 250;
   /** The pause after a request, as a multiple of the time that its answer took. */
   const REST = 20;
-  /** The most points of a signal in that time, and the fewest that the server accepts. */
-  const POINTS = 120;
-  const FEWEST = 5;
+  /** The most points of a signal in that time, and the fewest of a request: those of two spans. */
+  const POINTS = 240;
+  const FEWEST = 10;
   const HEIGHT = 24;
   const frame = document.getElementById("list");
   /** The canvases of the rows, and the signal of each; null in a row without a small trend. */
@@ -113,7 +113,7 @@ const sparks = (() => {
     put(canvas, signal) {
       rows.set(canvas, signal);
       drawn.delete(canvas);
-      context(canvas, width, HEIGHT);
+      if (width) context(canvas, width, HEIGHT);
       due = Math.min(due, performance.now() + PAUSE);
     },
     /** After the moment that the page shows has changed. */

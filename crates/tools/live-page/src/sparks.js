@@ -8,8 +8,9 @@ const sparks = (() => {
   const PERIOD = 2000;
   /** The pause after other rows are shown, or another moment, in milliseconds: moving the bar of time has to stay quick. */
   const PAUSE = 250;
-  /** The pause after a request, as a multiple of the time that its answer took. */
-  const REST = 20;
+  /** The same times as multiples of what an answer took: reading a long history costs the server much. */
+  const PERIODS = 20;
+  const PAUSES = 4;
   /** The most points of a signal in that time, and the fewest of a request: those of two spans. */
   const POINTS = 240;
   const FEWEST = 10;
@@ -26,7 +27,8 @@ const sparks = (() => {
   let width = 0;
   /** No request before these times. */
   let [due, rested] = [0, 0];
-  let moves = 0;
+  /** How often other rows or another moment were shown. */
+  let changes = 0;
 
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
     colours = null;
@@ -44,7 +46,8 @@ const sparks = (() => {
     const now = performance.now();
     if (!width || document.hidden || now < Math.max(due, rested)) return;
     due = now + PERIOD;
-    const before = moves;
+    let longest = 0;
+    const before = changes;
     for (const [signal, { until }] of known) if (until < endOf(signal) - LENGTH || !plant.drivers.includes(signal.driver)) known.delete(signal);
     const signals = shown().map(([, signal]) => signal);
     for (const signal of signals) if (!known.has(signal)) known.set(signal, trend.unknown());
@@ -58,11 +61,15 @@ const sparks = (() => {
       for (const request of trend.requests(driver, series, { begin, end, from: begin, to: end }, points)) {
         const asked = performance.now();
         await request();
-        rested = Math.max(rested, performance.now() + REST * (performance.now() - asked));
+        longest = Math.max(longest, performance.now() - asked);
       }
       for (const { trend } of series) drop(trend, begin);
     }
-    if (moves === before) frame.classList.remove("is-late");
+    rested = performance.now() + PAUSES * longest;
+    if (changes === before) {
+      due = Math.max(due, now + PERIODS * longest);
+      frame.classList.remove("is-late");
+    }
     draw();
   }
 
@@ -114,11 +121,12 @@ const sparks = (() => {
       rows.set(canvas, signal);
       drawn.delete(canvas);
       if (width) context(canvas, width, HEIGHT);
+      changes += 1;
       due = Math.min(due, performance.now() + PAUSE);
     },
     /** After the moment that the page shows has changed. */
     moved() {
-      moves += 1;
+      changes += 1;
       due = performance.now() + PAUSE;
       frame.classList.add("is-late");
     },

@@ -11,7 +11,9 @@ fn height(name: &str) -> String {
     format!(
         "(() => {{ \
            const canvas = {}.parts.spark; \
-           const {{ data }} = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height); \
+           const copy = new OffscreenCanvas(canvas.width, canvas.height).getContext('2d'); \
+           copy.drawImage(canvas, 0, 0); \
+           const {{ data }} = copy.getImageData(0, 0, canvas.width, canvas.height); \
            let [top, bottom] = [Infinity, -1]; \
            for (let i = 0; i < data.length / 4; i++) if (data[4 * i + 3]) {{ \
              const y = Math.floor(i / canvas.width); \

@@ -6,6 +6,7 @@ mod lists;
 mod outage;
 mod past;
 mod phone;
+mod sparks;
 mod touch;
 mod two_drivers;
 

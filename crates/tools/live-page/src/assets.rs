@@ -18,6 +18,7 @@ pub(crate) const ASSETS: &[Asset] = &[
     Asset::script("/elements.js", tickbus_web::ELEMENTS),
     Asset::script("/signals.js", include_str!("signals.js")),
     Asset::script("/trend.js", include_str!("trend.js")),
+    Asset::script("/sparks.js", include_str!("sparks.js")),
     Asset::script("/views.js", include_str!("views.js")),
     Asset::script("/watch.js", include_str!("watch.js")),
     Asset::script("/sets.js", include_str!("sets.js")),

@@ -170,7 +170,8 @@ const list = (() => {
       const name = part("name", "rowheader", element);
       const pin = button("pin", name);
       pin.tabIndex = -1;
-      const parts = { pin, name: part("text", "", name), mark: part("tag", "", name) };
+      const parts = { pin, name: part("text", "", name), mark: part("tag", "", name), spark: part("spark", "", name, "canvas") };
+      parts.spark.setAttribute("aria-hidden", "true");
       for (const cell of ["address", "value", "raw", "edges", "age"]) parts[cell] = part(cell, "gridcell", element);
       parts.lamp = part("lamp", "", parts.value);
       parts.number = part("number", "", parts.value);
@@ -225,6 +226,7 @@ const list = (() => {
     },
     signal(element, { signal }) {
       element.signal = signal;
+      set(element, "spark", signal.isOpen ? null : signal, (it, of) => sparks.put(it.parts.spark, of));
       const value = format.value(signal);
       const isOn = signal.isBool && plant.number(signal) > 0.5;
       text(element, "name", signal.name);

@@ -136,6 +136,7 @@
       line.show();
       if (list.kind === "forced" || list.kind === "failsafe") list.choose();
       trend.collect();
+      sparks.moved();
       analyser.moved();
       head.showLink();
       redraw();

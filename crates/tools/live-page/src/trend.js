@@ -14,11 +14,13 @@ const trend = (() => {
 
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { colours = null; });
 
+  /** The changes between `from` and `until` are known: none yet. */
+  const unknown = () => ({ times: [], values: [], from: Infinity, until: -Infinity, isSampled: false });
+
   /** Begins to collect a signal. */
   function open(signal) {
     signal.isOpen = true;
-    // The changes between `from` and `until` are known.
-    signal.trend ??= { times: [], values: [], from: Infinity, until: -Infinity, isSampled: false };
+    signal.trend ??= unknown();
   }
 
   function close(signal) {
@@ -48,24 +50,31 @@ const trend = (() => {
     }
     if (!open.length) return;
     const { begin, end } = view(driver);
+    const span = { begin, end, from: begin - length, to: driver.moment ? end + length : end + 1000 };
+    await Promise.all(requests(driver, open, span).map((request) => request()));
+    list.redraw();
+  }
+
+  /**
+   * The requests, as functions, for what signals lack between `begin` and `end`: one for those that continue, until `to`, and
+   * one for those that begin, from `from` on. `most` is the number of points that is enough for a time.
+   */
+  function requests(driver, signals, { begin, end, from: first, to }, most = () => "") {
     const ask = [];
-    for (const signal of open) {
+    for (const signal of signals) {
       const { trend } = signal;
       // What the server no longer has is not asked for again.
-      if (trend.from > Math.max(begin, driver.past.first) + 1 || trend.until < begin) Object.assign(trend, { times: [], values: [], from: Infinity, until: -Infinity });
+      if (trend.from > Math.max(begin, driver.past.first) + 1 || trend.until < begin) Object.assign(trend, unknown());
       if (trend.until < end && trend.until < driver.past.last) ask.push(signal);
     }
-    // In one request, those that go on, and in another those that begin.
     const groups = [ask.filter(({ trend }) => trend.times.length), ask.filter(({ trend }) => !trend.times.length)];
-    await Promise.all(groups.filter((group) => group.length).map(async (group) => {
-      const from = group[0].trend.times.length ? Math.min(...group.map(({ trend }) => trend.until)) : begin - length;
-      const to = driver.moment ? end + length : end + 1000;
-      const answer = await room.ask(`/trend/${driver.id}/${group.slice(0, 100).map(({ index }) => index).join(",")}/${from}/${to}`);
+    return groups.filter((group) => group.length).map((group) => async () => {
+      const from = group[0].trend.times.length ? Math.min(...group.map(({ trend }) => trend.until)) : first;
+      const answer = await room.ask(`/trend/${driver.id}/${group.slice(0, 100).map(({ index }) => index).join(",")}/${from}/${to}${most(to - from)}`);
       if (!answer.ok) return;
       const news = await answer.json();
       for (const { index, trend } of group) if (news.signals[index] && trend) add(trend, news.signals[index], news, from);
-    }));
-    list.redraw();
+    });
   }
 
   /** Puts the changes of an answer, from a time on, into the place of those that were known. */
@@ -107,6 +116,28 @@ const trend = (() => {
     if (trend.times.length > MOST) drop(trend);
   }
 
+  /** The changes from a time on, which becomes 0, with the value at that time. */
+  function since({ times, values }, begin) {
+    const first = Math.max(0, indexAt(times, begin));
+    return { times: times.slice(first).map((time) => time - begin), values: values.slice(first) };
+  }
+
+  /** Paints a trace, and returns the range of its values. */
+  function paintTrace(painted, signal, data, top, bottom) {
+    if (signal.isBool) {
+      paintBool(painted, data, top, bottom);
+      return [0, 1];
+    }
+    let [low, high] = [Infinity, -Infinity];
+    for (const value of data.values) {
+      if (value < low) low = value;
+      if (value > high) high = value;
+    }
+    if (low === high) [low, high] = [low - 1, high + 1];
+    paintReal(painted, { low, high }, data, top, bottom);
+    return [low, high];
+  }
+
   /** Draws a signal's trend on a canvas of this width. */
   function draw(canvas, signal, width, height) {
     colours ??= coloursAt(document.body);
@@ -117,14 +148,10 @@ const trend = (() => {
     const { begin, end, at } = view(signal.driver);
     // The moment that is shown is 0 s on the axis.
     run.begin = (begin - at) * run.unit;
-    const { times: allTimes, values: allValues, until, isSampled } = signal.trend;
+    const { until, isSampled } = signal.trend;
     const known = Math.min(end, Math.max(until, plant.now(signal.driver)));
     run.end = known - begin;
-    const first = Math.max(0, indexAt(allTimes, begin));
-    const data = {
-      times: allTimes.slice(first).map((time) => time - begin),
-      values: allValues.slice(first),
-    };
+    const data = since(signal.trend, begin);
     const value = plant.measured(signal);
     // The value of now is here before the server's next answer.
     if (!signal.driver.moment && data.times.length && !Object.is(value, data.values.at(-1))) {
@@ -138,18 +165,7 @@ const trend = (() => {
     ctx.beginPath();
     ctx.rect(painted.left, 0, painted.width, height - axis);
     ctx.clip();
-    let [low, high] = [0, 1];
-    if (signal.isBool) {
-      paintBool(painted, data, top, bottom);
-    } else {
-      [low, high] = [Infinity, -Infinity];
-      for (const value of data.values) {
-        if (value < low) low = value;
-        if (value > high) high = value;
-      }
-      if (low === high) [low, high] = [low - 1, high + 1];
-      paintReal(painted, { low, high }, data, top, bottom);
-    }
+    const [low, high] = paintTrace(painted, signal, data, top, bottom);
     if (signal.driver.moment) paintMoment(painted, at - begin, height - axis);
     ctx.restore();
     if (isSampled) paintSampled(painted, signal.driver.past !== null);
@@ -199,5 +215,5 @@ const trend = (() => {
     return length;
   }
 
-  return { open, close, draw, next, collect, merge, paintUnknown, get length() { return length; } };
+  return { open, close, draw, next, collect, merge, paintUnknown, unknown, requests, since, paintTrace, get length() { return length; } };
 })();

@@ -22,6 +22,9 @@ const MOST_IN_ALL: usize = 240_000;
 /// A signal has at least this share.
 const LEAST_POINTS: usize = 4_000;
 
+/// The fewest points that a request can limit each signal to: those of one span.
+const FEWEST_POINTS: usize = 5;
+
 /// The most signals of one request.
 const MOST_TRENDS: usize = 100;
 
@@ -47,18 +50,23 @@ struct Trends {
     signals: BTreeMap<usize, Trend>,
 }
 
-/// The trends of signals: `INDEX,INDEX/FROM/TO`, or `INDEX` for the last minutes.
+/// The trends of signals: `INDEX,INDEX/FROM/TO`, with `/MOST` behind it of about that many points each, or `INDEX` for
+/// the last minutes.
 pub(crate) fn document(archive: &Archive, path: &str) -> Option<String> {
     let span = archive.history.span();
     let (first, last) = span.map_or((Nanos::ZERO, Nanos::ZERO), |span| {
         (span.first.1, span.last.1)
     });
     let parts: Vec<&str> = path.split('/').collect();
-    let (indices, from, to) = match parts[..] {
-        [index] => (index, last - SPAN, last),
-        [indices, from, to] => (indices, time(from)?, time(to)?),
+    let (indices, from, to, asked) = match parts[..] {
+        [index] => (index, last - SPAN, last, MOST_POINTS),
+        [indices, from, to] => (indices, time(from)?, time(to)?, MOST_POINTS),
+        [indices, from, to, most] => (indices, time(from)?, time(to)?, most.parse().ok()?),
         _ => return None,
     };
+    if !(FEWEST_POINTS..=MOST_POINTS).contains(&asked) {
+        return None;
+    }
     let indices: Option<BTreeSet<usize>> =
         indices.split(',').map(|index| index.parse().ok()).collect();
     let indices: Vec<usize> = indices?.into_iter().collect();
@@ -68,7 +76,8 @@ pub(crate) fn document(archive: &Archive, path: &str) -> Option<String> {
     }
     let until = to.min(last);
     let known = (from.max(first), until);
-    let most = (MOST_IN_ALL / indices.len().max(1)).clamp(LEAST_POINTS, MOST_POINTS);
+    let share = (MOST_IN_ALL / indices.len().max(1)).clamp(LEAST_POINTS, MOST_POINTS);
+    let most = asked.min(share);
     let mut signals: BTreeMap<usize, Trend> = indices
         .iter()
         .copied()
@@ -145,7 +154,7 @@ struct Points {
 
 impl Points {
     fn new((from, to): (Nanos, Nanos), most: usize) -> Self {
-        let spans = i64::try_from(most / 5).unwrap_or(1);
+        let spans = i64::try_from(most / FEWEST_POINTS).unwrap_or(1);
         Self {
             kept: Vec::new(),
             from,

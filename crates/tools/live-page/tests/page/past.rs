@@ -80,10 +80,50 @@ fn every_tick_of_the_past_can_be_asked_for() {
         "/trend/1/0,9/0/1",
         "/trend/1/0/0",
         "/trend/1/",
+        "/trend/1/1/0/1e9/4",
+        "/trend/1/1/0/1e9/40001",
+        "/trend/1/1/0/1e9/-5",
+        "/trend/1/1/0/1e9/x",
+        "/trend/1/1/0/1e9/",
+        "/trend/1/1/0/1e9/5/5",
         "/history/1/tick/1/since/x",
     ] {
         assert_eq!(page.ask(&format!("GET {wrong}"), "", "").0, 404, "{wrong}");
     }
+}
+
+#[test]
+fn a_trend_of_few_points_has_the_extremes() {
+    let page = Page::open();
+    let simulation = Simulation::start(&page, 1, "Cell", EVER);
+    simulation.pass(5);
+    for value in 1..=60 {
+        // One tick stands out.
+        let value = if value == 31 { 200 } else { value };
+        simulation.slots(0, f64::from(value));
+    }
+    simulation.pass(2);
+    let trend = |path: &str| page.get(&format!("/trend/1/{path}"))["signals"].take();
+    let values = |of: &Value| of["values"].as_array().cloned().unwrap_or_default();
+    eventually("the recorder has taken them", || {
+        values(&trend("1/0/1e12")["1"]).last() == Some(&60.0.into())
+    });
+    let all = trend("1/0/1e12/61");
+    assert_eq!(
+        (values(&all["1"]).len(), &all["1"]["is_thin"]),
+        (61, &Value::Null)
+    );
+    let few = trend("1,4/0/1e12/20");
+    assert_eq!(few["1"]["is_thin"], true);
+    let kept = values(&few["1"]);
+    assert!(
+        kept.len() <= 25,
+        "four spans, and what is at their end: {kept:?}"
+    );
+    for value in [0.0, 200.0, 60.0] {
+        assert!(kept.contains(&value.into()), "{kept:?}");
+    }
+    assert_eq!(values(&few["4"]).len(), 1);
 }
 
 #[test]

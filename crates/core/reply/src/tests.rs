@@ -555,7 +555,7 @@ fn wrong_sections_are_refused_at_their_place() {
         ),
         (
             "kind = \"follows\"\nsignal = \"a\"\nwhen = \"B rises\"",
-            "x:4:8: a reply waits for no edge, which is over at once; write the condition without \"rises\" or \"falls\"; a \
+            "x:4:8: a reply waits for no edge, which is over at once; write the condition without \"rises\", \"falls\" or \"changes\"; a \
              counter counts how often it begins to hold",
         ),
         (
@@ -597,7 +597,7 @@ fn wrong_sections_are_refused_at_their_place() {
         ),
         (
             "kind = \"rule\"\nwhen = \"A rises\"\nset = { a = true }\nelse = { a = false }",
-            "x:5:8: an edge has no \"else\": it is over at once; write the condition without \"rises\" or \"falls\", or a second rule",
+            "x:5:8: an edge has no \"else\": it is over at once; write the condition without \"rises\", \"falls\" or \"changes\", or a second rule",
         ),
         (
             "kind = \"rule\"\nwhen = \"A\"\nset = { A = true }",

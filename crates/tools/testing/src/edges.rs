@@ -10,6 +10,7 @@ use super::watch::Watch;
 pub(super) struct Bookmark {
     rises: u64,
     falls: u64,
+    changes: u64,
 }
 
 impl Bookmark {
@@ -17,6 +18,7 @@ impl Bookmark {
         Self {
             rises: watch.rises(),
             falls: watch.falls(),
+            changes: watch.changes(),
         }
     }
 
@@ -26,6 +28,7 @@ impl Bookmark {
         match &condition.demand {
             Demand::Rises => watch.rises() > self.rises,
             Demand::Falls => watch.falls() > self.falls,
+            Demand::Changes => watch.changes() > self.changes,
             _ => condition.holds_for(watch.value(), slots),
         }
     }

@@ -218,3 +218,260 @@ impl Archive {
         self.forced(force, own, time - since)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use tickbus_fieldbus::faults::{FaultStatus, Phase};
+    use tickbus_image::signal::{Area, DataType, Signal};
+    use tickbus_record::{Column, Columns, History, Tick, ValueKind};
+
+    use super::*;
+    use crate::archive::Facts;
+    use crate::forcing::Way;
+
+    /// The values of a tick: of "Run", "Start and stop", "Level" and "Phase". The last one is read, and can be stale.
+    type Values = [f64; 4];
+
+    /// An archive of a tick a millisecond, the first with the number `first`, and stale in these ticks.
+    fn archive(first: u64, ticks: &[Values], stale: &[u64], limit: usize) -> Archive {
+        let signal = |name: &str, area, data_type| Signal::new(name, area, 0, data_type);
+        let signals = vec![
+            signal("Run", Area::Output, DataType::Bool),
+            signal("Start and stop", Area::Output, DataType::Bool),
+            signal("Level", Area::Output, DataType::Real),
+            signal("Phase", Area::Input, DataType::Int),
+        ];
+        let column = |signal: &Signal| Column {
+            name: signal.name.clone(),
+            is_edges: false,
+            kind: ValueKind::of(signal.data_type, false),
+            address: None,
+            data_type: Some(signal.data_type),
+            unit: None,
+            station: String::new(),
+        };
+        let columns = Columns {
+            driver: "x".to_owned(),
+            role: "device".to_owned(),
+            stations: Vec::new(),
+            columns: signals.iter().map(column).collect(),
+        };
+        let history = History::new(columns.clone(), limit);
+        for (number, values) in (first..).zip(ticks) {
+            let mut tick = Tick {
+                number,
+                time: Nanos::from_millis(number.cast_signed()),
+                status: if stale.contains(&number) { 2 } else { 0 },
+                ..Tick::new(&columns)
+            };
+            tick.values = values.map(Slot::from_real).to_vec();
+            history.push(&tick);
+        }
+        let facts = Facts {
+            table: SignalTable {
+                signals,
+                ..SignalTable::default()
+            },
+            reads: Some(Area::Input),
+            is_fail_safe: false,
+            is_sampled: false,
+            has_bits: false,
+        };
+        Archive::new(Arc::new(history), facts)
+    }
+
+    fn answer(archive: &Archive, text: &str, is_forward: bool, from: u64) -> serde_json::Value {
+        serde_json::from_str(&archive.when(text, is_forward, from)).expect("right")
+    }
+
+    /// All ticks at which the conditions begin to hold, which are the same in both directions.
+    fn found(archive: &Archive, text: &str) -> Vec<u64> {
+        let all = |is_forward, mut from| {
+            let mut ticks = Vec::new();
+            loop {
+                let answer = answer(archive, text, is_forward, from);
+                assert_eq!(answer.get("wrong"), None, "{text}");
+                let Some(tick) = answer["tick"].as_u64() else {
+                    return ticks;
+                };
+                #[expect(clippy::cast_precision_loss, reason = "small numbers")]
+                let ms = tick as f64;
+                assert_eq!(answer["ms"], ms, "{text}");
+                ticks.push(tick);
+                from = tick;
+            }
+        };
+        let next = all(true, 0);
+        let mut last = all(false, u64::MAX);
+        last.reverse();
+        assert_eq!(next, last, "{text}");
+        next
+    }
+
+    const TICKS: [Values; 10] = [
+        [1.0, 0.0, 0.0, 3.0],
+        [0.0, 0.0, 1.5, 3.0],
+        [1.0, 0.0, 2.5, 3.0],
+        [0.0, 1.0, 2.5, 4.0],
+        [1.0, 1.0, f64::NAN, 3.0],
+        [1.0, 1.0, 2.5, 3.0],
+        [1.0, 0.0, 2.5, 3.0],
+        [0.0, 0.0, 3.5, 3.0],
+        [0.0, 1.0, 4.5, 0.0],
+        [1.0, 1.0, 4.4, 5.0],
+    ];
+
+    #[test]
+    fn every_condition_begins_where_it_holds_and_did_not_before() {
+        let archive = archive(1, &TICKS, &[], 1 << 20);
+        for (text, ticks) in [
+            // What holds in the first tick may have begun before.
+            ("Run", &[3, 5, 10][..]),
+            ("not Run", &[2, 4, 8]),
+            ("Run == 1", &[3, 5, 10]),
+            ("Run rises", &[3, 5, 10]),
+            ("Run falls", &[2, 4, 8]),
+            ("Run changes", &[2, 3, 4, 5, 8, 10]),
+            ("Phase == 3", &[5]),
+            ("Phase != 3", &[4, 9]),
+            ("Phase rises", &[10]),
+            ("Phase falls", &[9]),
+            ("Phase changes", &[4, 5, 9, 10]),
+            // Unknown values neither hold nor are edges; what holds behind them begins there.
+            ("Level > 2", &[3, 6]),
+            ("Level <= 2", &[]),
+            ("Level changes", &[2, 3, 8, 9, 10]),
+            ("Level == 4.4 ± 0.2", &[9]),
+            ("Level == 4.4 +- 0.05", &[10]),
+            ("Start and stop rises", &[4, 9]),
+            // In the same tick.
+            ("Run and Phase == 3", &[3, 5]),
+            ("Run and Start and stop", &[5, 10]),
+            ("not Start and stop and Level > 2", &[3, 7]),
+            ("Start and stop falls and Run rises", &[]),
+            ("Run falls and Start and stop rises", &[4]),
+            ("Run%20and%20Level%20%3C%205", &[3, 6, 10]),
+        ] {
+            assert_eq!(found(&archive, text), ticks, "{text}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_condition_is_told() {
+        let archive = archive(1, &TICKS, &[], 1 << 20);
+        for (text, told) in [
+            (
+                " ",
+                "no condition is written; write one such as \"Run changes\"",
+            ),
+            (
+                "Rnu rises",
+                "there is no signal \"Rnu\"; did you mean \"Run\"?",
+            ),
+            (
+                "Run and Levle > 3",
+                "there is no signal \"Levle\"; did you mean \"Level\"?",
+            ),
+            (
+                "Level",
+                "\"Level\" is no BOOL, and cannot be true by itself; compare it, such as \"Level > 0\"",
+            ),
+            (
+                "Run > 3",
+                "\"Run > 3\" never changes; \"Run\" (BOOL) goes from 0 to 1",
+            ),
+            (
+                "Run and ",
+                "no signal is named; signals are Run, Start and stop, Level, Phase",
+            ),
+        ] {
+            assert_eq!(answer(&archive, text, true, 0)["wrong"], told, "{text}");
+        }
+        let long = answer(&archive, &"Run and ".repeat(600), true, 0);
+        assert_eq!(
+            long["wrong"],
+            "the conditions have 4800 bytes; write at most 4096"
+        );
+    }
+
+    #[test]
+    fn a_stale_value_holds_nothing_and_has_no_edge() {
+        let archive = archive(1, &TICKS, &[2, 3, 10], 1 << 20);
+        assert_eq!(found(&archive, "Phase >= 3"), [4]);
+        assert_eq!(found(&archive, "Phase changes"), [5, 9]);
+        // This end writes it.
+        assert_eq!(found(&archive, "Run"), [3, 5, 10]);
+        assert_eq!(found(&archive, "Run and Phase != 4"), [5]);
+    }
+
+    #[test]
+    fn what_has_left_the_memory_is_told_and_no_edge() {
+        let ticks: Vec<Values> = (0..20_000)
+            .map(|tick| [f64::from(tick % 2), 0.0, f64::from(tick), 0.0])
+            .collect();
+        let archive = archive(5, &ticks, &[], 8 << 10);
+        let first = archive.history.span().expect("ticks").first.0;
+        assert!(first > 1_000, "{first}");
+        let near = |from| {
+            let answer = answer(&archive, "Run changes", true, from);
+            (answer["tick"].as_u64(), answer["is_cut"] == true)
+        };
+        assert_eq!(near(7), (Some(first + 1), true));
+        assert_eq!(near(0), (Some(first + 1), false));
+        assert_eq!(near(first - 1), (Some(first + 1), false));
+        assert_eq!(near(first), (Some(first + 1), false));
+        // After a restart the ticks end before the one that was looked at.
+        let last = archive.last();
+        let late = answer(&archive, "Run changes", true, last + 7);
+        assert_eq!(
+            (late["tick"].as_u64(), late["until"].as_u64()),
+            (None, Some(last))
+        );
+    }
+
+    #[test]
+    fn forced_values_count_in_their_ticks_once_they_are_known() {
+        let archive = archive(1, &[[0.0; 4]; 40], &[], 1 << 20);
+        let status = |id, name: &str, phase, tick| FaultStatus {
+            id,
+            name: format!("forced: {name}"),
+            kind: "stuck",
+            what: format!("\"{name}\" is forced"),
+            phase,
+            begun: 1,
+            since: Nanos::ZERO,
+            tick,
+        };
+        archive.note_faults(&[], 0, 9);
+        archive.note_force(1, Way::Hold.force(0, Slot::from_real(1.0), None));
+        let next = |text: &str, from| {
+            let answer = answer(&archive, text, true, from);
+            (answer["tick"].as_u64(), answer["until"].as_u64())
+        };
+        // It may be forced in a later tick.
+        assert_eq!(next("Run", 0), (None, Some(9)));
+        assert_eq!(next("Run", 12), (None, Some(12)));
+        archive.note_faults(&[status(1, "Run", Phase::Active, 12)], 0, 20);
+        assert_eq!(next("Run", 9), (Some(12), Some(20)));
+        assert_eq!(next("Run rises", 9), (Some(12), Some(20)));
+        assert_eq!(next("Run", 12), (None, Some(20)));
+        let up = Way::Ramp(Nanos::from_millis(10));
+        archive.note_force(2, up.force(2, Slot::from_real(100.0), None));
+        let both = [
+            status(1, "Run", Phase::Over, 15),
+            status(2, "Level", Phase::Active, 20),
+        ];
+        archive.note_faults(&both, 0, 40);
+        assert_eq!(found(&archive, "not Run"), [15]);
+        assert_eq!(found(&archive, "Run changes"), [12, 15]);
+        // A ramp goes on in each tick, and is seen from its middle on.
+        assert_eq!(found(&archive, "Level > 33"), [24]);
+        assert_eq!(next("Level > 33", 22), (Some(24), Some(40)));
+        assert_eq!(
+            found(&archive, "Level changes"),
+            (21..=30).collect::<Vec<_>>()
+        );
+    }
+}

@@ -9,6 +9,8 @@ const trigger = (() => {
   const [field, insert] = [get("trigger-text"), get("trigger-insert")];
   /** The time between two looks, in milliseconds. */
   const PERIOD = 100;
+  /** The most signals that are offered where none is on the axis. */
+  const ROOM = 24;
   let act = {};
   let signals = [];
   /** The id of the driver whose condition was inserted last. */
@@ -87,10 +89,11 @@ const trigger = (() => {
     }
   }
 
-  /** Offers the conditions on the signals of the axis and the chosen one. */
+  /** Offers the conditions on the signals of the axis and the chosen one; without any, on the first ones of the list. */
   function offer() {
-    const all = new Set([...signals, act.chosen()].filter((it) => it?.driver.past));
-    insert.replaceChildren(new Option("Insert…", ""), ...[...all].flatMap(({ name, isBool, driver }) => (isBool ? ["", "not ", " rises", " falls", " changes"] : [" changes", " > ", " < ", " == "]).map((it) => {
+    const own = new Set([...signals, act.chosen()].filter((it) => it?.driver.past));
+    const all = own.size ? [...own] : plant.signals.slice(0, ROOM);
+    insert.replaceChildren(new Option("Insert…", ""), ...all.flatMap(({ name, isBool, driver }) => (isBool ? ["", "not ", " rises", " falls", " changes"] : [" changes", " > ", " < ", " == "]).map((it) => {
       const option = new Option(it === "not " ? it + name : name + it);
       option.driver = driver.id;
       return option;

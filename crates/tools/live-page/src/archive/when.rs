@@ -299,6 +299,7 @@ mod tests {
                 #[expect(clippy::cast_precision_loss, reason = "small numbers")]
                 let ms = tick as f64;
                 assert_eq!(answer["ms"], ms, "{text}");
+                assert_ne!(tick, from, "{text}");
                 ticks.push(tick);
                 from = tick;
             }

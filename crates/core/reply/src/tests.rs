@@ -323,14 +323,14 @@ fn lamps_blink_and_life_signs_count_or_repeat() {
 #[test]
 fn a_rule_takes_effect_at_each_change_of_a_number() {
     let mut machine = Machine::new(
-        "[[reply]]\nkind = \"rule\"\nwhen = \"J changes\"\nset = { a = true }\n\
+        "[[reply]]\nkind = \"rule\"\nwhen = \"N changes\"\nset = { a = true }\n\
          [[reply]]\nkind = \"rule\"\nwhen = \"A\"\nset = { a = false }\n",
     );
     // The value of the first tick is no change.
-    machine.set("J", 5.0);
+    machine.set("N", 5.0);
     assert_eq!(machine.values("a", 2), "0 0");
     for value in [6.0, 5.0] {
-        machine.set("J", value);
+        machine.set("N", value);
         assert_eq!(machine.values("a", 2), "1 1");
         machine.set("A", 1.0);
         assert_eq!(machine.values("a", 1), "0");

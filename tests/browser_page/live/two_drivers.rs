@@ -72,7 +72,7 @@ impl Drop for Ticking {
 }
 
 /// Two drivers on a page, and a browser. The bar shows the time of the slow one.
-fn opened() -> ([Ticking; 2], Serving, Browser) {
+fn opened() -> (LivePage, [Ticking; 2], Serving, Browser) {
     let page = LivePage::open(Monotonic::shared()).expect("a thread");
     let room = Room::bind(&Address::local(0), Limits::default()).expect("a port");
     let address = room.address();
@@ -87,12 +87,12 @@ fn opened() -> ([Ticking; 2], Serving, Browser) {
     let browser = Browser::start(1280, 900);
     browser.go(&format!("http://{address}/"));
     browser.wait("bar.lead?.name === 'Slow' && plant.drivers.every(({ past }) => past?.tick > 12)");
-    (drivers, serving.expect("a thread"), browser)
+    (page, drivers, serving.expect("a thread"), browser)
 }
 
 #[test]
 fn a_condition_is_about_the_driver_whose_signals_it_names() {
-    let (_drivers, _serving, browser) = opened();
+    let (_page, _drivers, _serving, browser) = opened();
     let level = "Number(plant.signals.find((it) => it.name === 'Fast level').value)";
     browser.run(&format!(
         "window.limit = {level} + 3; document.getElementById('trigger-text').value = `Fast level > ${{limit}}`; \
@@ -116,7 +116,7 @@ fn a_condition_is_about_the_driver_whose_signals_it_names() {
 
 #[test]
 fn the_cursor_goes_from_edge_to_edge_of_a_driver_whose_ticks_the_bar_does_not_have() {
-    let (_drivers, _serving, browser) = opened();
+    let (_page, _drivers, _serving, browser) = opened();
     for name in ["Slow level", "Fast level"] {
         browser.run(&format!(
             "list.select(plant.signals.find((it) => it.name === {})); analyser.add(list.chosen)",

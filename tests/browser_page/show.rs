@@ -84,6 +84,32 @@ fn a_recording_opens_at_its_end_and_goes_to_any_moment() {
     browser.wait("document.querySelector('.row.trend:not([hidden]) canvas')?.getAttribute('aria-label') === 'Trend of Level'");
     shoot(&browser, screenshots.as_deref(), "show", false);
     assert_fits(&browser);
+    // Jumps to conditions, without a signal on the axis: by the field, its key and the bar.
+    browser.run("document.querySelector('[data-view=recording]').click(); document.getElementById('trigger-text').value = 'Level >= 40 and Valve == 1'");
+    let when = |id: &str| {
+        browser.run(&format!("document.getElementById('{id}').click()"));
+    };
+    when("last-when");
+    moment("2.000 s of 10.000 s · tick 200");
+    when("last-when");
+    browser.wait("document.getElementById('status').textContent === 'There is no earlier beginning of “Level >= 40 and Valve == 1” in the recorded time.'");
+    browser.run("const it = document.getElementById('trigger-text'); it.value = 'Level changes'; it.focus()");
+    browser.keys("\u{e007}");
+    moment("2.050 s of 10.000 s · tick 205");
+    browser.run("document.getElementById('trigger-text').value = 'Level < 100'; document.getElementById('goal').value = 'when'");
+    when("next-goal");
+    moment("5.050 s of 10.000 s · tick 505");
+    // Data are stale from tick 600 to tick 699.
+    when("next-goal");
+    moment("7.000 s of 10.000 s · tick 700");
+    browser.run("document.getElementById('trigger-text').value = 'Levle < 60'");
+    when("next-goal");
+    browser.wait("document.getElementById('trigger-told').textContent === 'there is no signal \"Levle\"; did you mean \"Level\"?'");
+    assert_eq!(
+        browser.run("return [bar.moment.tick, document.getElementById('arm').hidden]"),
+        json!([700, true])
+    );
+    assert_fits(&browser);
     assert_quiet(&browser);
 }
 

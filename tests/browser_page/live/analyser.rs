@@ -237,13 +237,19 @@ fn the_axis_is_zoomed_and_moved_by_wheel_fingers_and_keys() {
     assert_quiet(&browser);
 }
 
-/// Arms the trigger.
-fn arm(browser: &Browser, name: &str, case: &str, limit: &str) {
+/// Waits for a condition, as with its button.
+fn arm(browser: &Browser, condition: &str) {
     browser.run(&format!(
-        "const [signal, kind, limit] = ['trigger-signal', 'trigger-case', 'trigger-limit'].map((id) => document.getElementById(id)); \
-         signal.value = plant.keyOf(plant.signals.find((it) => it.name === '{name}')); \
-         kind.value = '{case}'; kind.dispatchEvent(new Event('change')); limit.value = '{limit}'; \
-         document.getElementById('arm').click()"
+        "document.getElementById('trigger-text').value = {}; document.getElementById('arm').click()",
+        json!(condition)
+    ));
+}
+
+/// Waits until the sentence at the field of the condition begins like this.
+fn wait_told(browser: &Browser, words: &str) {
+    browser.wait(&format!(
+        "document.getElementById('trigger-told').textContent.startsWith({})",
+        json!(words)
     ));
 }
 
@@ -253,14 +259,15 @@ fn the_trigger_waits_on_after_a_restart_whose_time_begins_again() {
     let browser = opened(&machine, 1280, 900);
     // Later than the change of the next run.
     browser.wait("bar.lead.past.last > 8000");
-    arm(&browser, "Level low", "rises", "");
+    arm(&browser, "Level low rises");
     browser.wait("trigger.isArmed");
     machine.restart();
     browser.wait("bar.lead?.past?.last < 4000 && bar.lead.past.tick > 0");
     assert_eq!(browser.run("return trigger.isArmed"), true);
     machine.write("0", "0", "0");
     machine.write("0", "0", "1");
-    wait_said(&browser, "Level low rose at ");
+    wait_said(&browser, "Level low rises: at ");
+    browser.wait("bar.moment");
     let fired = browser.run("return bar.moment.ms");
     assert!(
         fired.as_f64().is_some_and(|ms| ms < 8000.0),
@@ -272,17 +279,31 @@ fn the_trigger_waits_on_after_a_restart_whose_time_begins_again() {
 fn the_trigger_stops_the_view_at_the_tick_of_the_change() {
     let machine = worked();
     let browser = opened(&machine, 1280, 900);
-    let wait_for = |name: &str, case: &str, limit: &str| arm(&browser, name, case, limit);
-    wait_for("Level", "above", "much");
-    wait_said(&browser, "\"much\" is not a number");
-    wait_for("Level", "above", "100");
-    browser.wait("trigger.isArmed");
+    arm(&browser, "Level > much");
+    wait_told(&browser, "\"much\" is no number; ");
+    arm(&browser, "Levle > 100 and Level low");
+    wait_told(
+        &browser,
+        "there is no signal \"Levle\"; did you mean \"Level\"?",
+    );
+    let kept = browser.run(
+        "return [document.activeElement.value, document.activeElement.getAttribute('aria-invalid'), trigger.isArmed]",
+    );
+    assert_eq!(kept, json!(["Levle > 100 and Level low", "true", false]));
+    shoot(
+        &browser,
+        crate::screenshots().as_deref(),
+        "condition.png",
+        false,
+    );
+    arm(&browser, "Level > 100");
+    browser.wait("trigger.isArmed && !document.getElementById('trigger-told').textContent");
     // The signal is above the limit already, so the trigger waits until it has been below.
     machine.write("4", "1", "0");
     machine.write("4", "1", "2765");
     assert_eq!(browser.run("return trigger.isArmed"), true);
     machine.write("4", "1", "13824");
-    wait_said(&browser, "Level went above 100 mm at ");
+    wait_said(&browser, "Level > 100: at ");
     browser.wait("bar.moment && tickbusPage.value('Level') === 250");
     let tick = browser.run("return bar.moment.tick").as_u64();
     assert_eq!(
@@ -296,10 +317,21 @@ fn the_trigger_stops_the_view_at_the_tick_of_the_change() {
         tick.expect("a tick") - 1
     ));
     assert_eq!(browser.run("return tickbusPage.value('Level') < 100"), true);
-    wait_for("Level low", "falls", "");
+    // Without its signal on the axis, and with two conditions from the list of those that are offered.
+    browser.run("document.getElementById('trigger-text').value = ''; document.querySelector('#tracks .remove').click()");
+    choose(&browser, "Level low");
+    for offered in ["Level low falls", "Level >"] {
+        browser.run(&format!(
+            "const insert = document.getElementById('trigger-insert'); \
+             [...insert.options].find((it) => it.text === '{offered}').selected = true; \
+             insert.dispatchEvent(new Event('change'))"
+        ));
+    }
+    browser.keys("20");
+    browser.run("document.getElementById('arm').click()");
     browser.wait("trigger.isArmed && !bar.moment");
     machine.write("0", "0", "0");
-    wait_said(&browser, "Level low fell at ");
+    wait_said(&browser, "Level low falls and Level > 20: at ");
     browser
         .wait("bar.moment && !plant.number(plant.signals.find((it) => it.name === 'Level low'))");
     assert_quiet(&browser);
@@ -377,30 +409,19 @@ fn the_axis_is_there_again_after_a_reload() {
 }
 
 #[test]
-fn a_trigger_asks_again_for_changes_that_were_too_many() {
+fn a_trigger_that_slept_stops_at_the_first_of_many_changes() {
     let machine = worked();
     let browser = opened(&machine, 1280, 800);
-    // The server gives the extremes alone of many changes; here, of more than three.
     browser.run(
-        "const ask = room.ask; window.thinned = 0; \
-         const gate = new Promise((go) => { window.letGo = go; }); \
+        "const ask = room.ask; const gate = new Promise((go) => { window.letGo = go; }); \
          room.ask = async (path, options) => { \
-           if (!path.startsWith('/trend/')) return ask(path, options); \
-           await gate; \
-           const answer = await ask(path, options); \
-           const news = await answer.json(); \
-           for (const it of Object.values(news.signals)) { \
-             if (it.ms.length <= 3) continue; \
-             thinned += 1; \
-             const last = it.ms.length - 1; \
-             Object.assign(it, { is_thin: true, ms: [0, last >> 1, last].map((i) => it.ms[i]), values: [1, 1, 1] }); \
-           } \
-           return { ok: true, json: async () => news }; \
+           if (trigger.isArmed && path.includes('/when/')) await gate; \
+           return ask(path, options); \
          }",
     );
     let lows = "(await (await fetch('/trend/' + plant.drivers[0].id + '/' + plant.signals.find((it) => it.name === 'Level low').index)).json())";
     let known = browser.run(&format!("return {lows}.ms.length"));
-    arm(&browser, "Level low", "rises", "");
+    arm(&browser, "Level low rises");
     browser.wait("trigger.isArmed");
     for valve in ["0", "1", "0", "1", "0", "1"] {
         machine.write("0", "0", valve);
@@ -408,13 +429,10 @@ fn a_trigger_asks_again_for_changes_that_were_too_many() {
         wait_shown(&browser, "Level low", shown);
     }
     browser.run("letGo()");
-    wait_said(&browser, "Level low rose");
-    let told = browser.run(&format!(
-        "return [trigger.isArmed, thinned > 0, bar.moment?.ms ?? analyser.view.end, {lows}]"
-    ));
-    assert_eq!((&told[0], &told[1]), (&json!(false), &json!(true)));
-    let first = known.as_u64().and_then(|known| usize::try_from(known).ok());
-    let rise = &told[3]["ms"][first.expect("a number") + 1];
+    wait_said(&browser, "Level low rises: at ");
+    let known = known.as_u64().and_then(|known| usize::try_from(known).ok());
+    let trend = browser.run(&format!("return {lows}"));
+    let rise = &trend["ms"][known.expect("a number") + 1];
     browser.wait(&format!("Math.abs(bar.moment?.ms - {rise}) < 1e-6"));
     assert_quiet(&browser);
 }

@@ -10,7 +10,7 @@ use tickbus::signal::Slot;
 use tickbus::time::{Clock as _, Monotonic, Nanos, Pace, Stop};
 use tickbus_live_page::{LivePage, Member, Options};
 use tickbus_net::Address;
-use tickbus_web::{Limits, Room};
+use tickbus_web::{Limits, Room, Serving};
 
 use crate::webdriver::Browser;
 use crate::{assert_quiet, wait_said};
@@ -71,21 +71,52 @@ impl Drop for Ticking {
     }
 }
 
-#[test]
-fn the_cursor_goes_from_edge_to_edge_of_a_driver_whose_ticks_the_bar_does_not_have() {
+/// Two drivers on a page, and a browser. The bar shows the time of the slow one.
+fn opened() -> (LivePage, [Ticking; 2], Serving, Browser) {
     let page = LivePage::open(Monotonic::shared()).expect("a thread");
     let room = Room::bind(&Address::local(0), Limits::default()).expect("a port");
     let address = room.address();
-    let _serving = room.serve(
+    let serving = room.serve(
         tickbus_web::Pages::of("Live page", page.site()),
         Monotonic::shared(),
     );
-    // The bar shows the time of the first one.
-    let _slow = Ticking::start(&page, 1, "Slow", Nanos::from_millis(97));
-    let _fast = Ticking::start(&page, 2, "Fast", Nanos::from_millis(11));
+    let drivers = [
+        Ticking::start(&page, 1, "Slow", Nanos::from_millis(97)),
+        Ticking::start(&page, 2, "Fast", Nanos::from_millis(11)),
+    ];
     let browser = Browser::start(1280, 900);
     browser.go(&format!("http://{address}/"));
     browser.wait("bar.lead?.name === 'Slow' && plant.drivers.every(({ past }) => past?.tick > 12)");
+    (page, drivers, serving.expect("a thread"), browser)
+}
+
+#[test]
+fn a_condition_is_about_the_driver_whose_signals_it_names() {
+    let (_page, _drivers, _serving, browser) = opened();
+    let level = "Number(plant.signals.find((it) => it.name === 'Fast level').value)";
+    browser.run(&format!(
+        "window.limit = {level} + 3; document.getElementById('trigger-text').value = `Fast level > ${{limit}}`; \
+         document.querySelector('[data-view=recording]').click(); document.getElementById('arm').click()"
+    ));
+    browser.wait("trigger.isArmed");
+    wait_said(&browser, "Fast level > ");
+    browser.wait(&format!("bar.moment && {level} === limit + 1"));
+    let fast = browser.run("return plant.drivers[1].moment.tick").as_u64();
+    browser.run("document.getElementById('trigger-text').value = 'Fast level changes'; document.getElementById('last-when').click()");
+    let before = fast.expect("a tick") - 10;
+    browser.wait(&format!(
+        "plant.drivers[1].moment.tick === {before} && {level} === limit"
+    ));
+    browser.run("document.getElementById('trigger-text').value = 'Fast level > 3 and Slow level > 3'; document.getElementById('last-when').click()");
+    browser.wait(
+        "document.getElementById('trigger-told').textContent.startsWith('there is no signal ')",
+    );
+    assert_quiet(&browser);
+}
+
+#[test]
+fn the_cursor_goes_from_edge_to_edge_of_a_driver_whose_ticks_the_bar_does_not_have() {
+    let (_page, _drivers, _serving, browser) = opened();
     for name in ["Slow level", "Fast level"] {
         browser.run(&format!(
             "list.select(plant.signals.find((it) => it.name === {})); analyser.add(list.chosen)",

@@ -17,6 +17,7 @@ use super::signal::real;
 /// | `NAME == 3`, `!=`, `<`, `<=`, `>`, `>=` | the comparison is true |
 /// | `NAME == 120 ± 0.5` (or `+- 0.5`) | the value is within the tolerance |
 /// | `NAME rises`, `NAME falls` | it has switched on, off, since the wait began |
+/// | `NAME changes` | its value has changed since the wait began |
 #[derive(Clone, Debug, PartialEq)]
 pub struct Condition {
     /// Index of the signal in the table.
@@ -42,6 +43,8 @@ pub enum Demand {
     Rises,
     /// The value has changed to 0 since the wait began.
     Falls,
+    /// The value has changed since the wait began.
+    Changes,
 }
 
 impl Condition {
@@ -60,7 +63,8 @@ impl Condition {
             .strip_prefix("not ")
             .map(|name| (name.trim(), Demand::Off))
             .or_else(|| ending(" rises", Demand::Rises))
-            .or_else(|| ending(" falls", Demand::Falls));
+            .or_else(|| ending(" falls", Demand::Falls))
+            .or_else(|| ending(" changes", Demand::Changes));
         match special.map(|(name, demand)| (table.position(name), name, demand)) {
             Some((Some(signal), _, Demand::Off)) => return bit(signal, Demand::Off, table),
             Some((Some(signal), _, demand)) => return Ok(Self { signal, demand }),
@@ -105,13 +109,24 @@ impl Condition {
             Demand::Near(number, tolerance) => (value - number).abs() <= *tolerance,
             Demand::Is(slot, _) => slots[self.signal] == *slot,
             Demand::Compares(condition, _) => condition.holds(slots),
-            Demand::Rises | Demand::Falls => false,
+            Demand::Rises | Demand::Falls | Demand::Changes => false,
+        }
+    }
+
+    /// Returns true if the condition is about an edge, and a signal has it that goes from one slot to the next; each
+    /// slot with its value.
+    pub fn holds_between(&self, before: (Slot, f64), now: (Slot, f64)) -> bool {
+        match self.demand {
+            Demand::Rises => before.1 == 0.0 && now.1 != 0.0,
+            Demand::Falls => before.1 != 0.0 && now.1 == 0.0,
+            Demand::Changes => before.0 != now.0,
+            _ => false,
         }
     }
 
     /// Returns true if the condition is about an edge, not a level.
     pub const fn is_edge(&self) -> bool {
-        matches!(self.demand, Demand::Rises | Demand::Falls)
+        matches!(self.demand, Demand::Rises | Demand::Falls | Demand::Changes)
     }
 }
 
@@ -152,6 +167,7 @@ impl fmt::Display for Demand {
             Self::Is(_, number) => f.write_str(&short_number(*number)),
             Self::Rises => f.write_str("a rising edge"),
             Self::Falls => f.write_str("a falling edge"),
+            Self::Changes => f.write_str("a change"),
         }
     }
 }
@@ -224,6 +240,7 @@ mod tests {
             ("Not OK != 1", 0, "off"),
             ("Not OK rises", 0, "a rising edge"),
             ("Not OK falls", 0, "a falling edge"),
+            ("Height changes", 2, "a change"),
             ("Level >= 3", 1, "on"),
             ("Level >= 3 == 0", 1, "off"),
             ("not Level >= 3", 1, "off"),
@@ -256,6 +273,10 @@ mod tests {
             ),
             (
                 "Heigth rises",
+                "there is no signal \"Heigth\"; did you mean \"Height\"?",
+            ),
+            (
+                "Heigth changes",
                 "there is no signal \"Heigth\"; did you mean \"Height\"?",
             ),
             (

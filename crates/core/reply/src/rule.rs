@@ -4,7 +4,6 @@ use tickbus_base::time::Nanos;
 use tickbus_image::signal::Slot;
 
 use super::Condition;
-use super::condition::Demand;
 use super::io::{Io, seconds};
 use super::signal::Form;
 
@@ -146,21 +145,21 @@ pub(crate) struct Ruled {
     /// The form of the signal of each condition.
     pub(crate) forms: Vec<Form>,
     pub(crate) course: Course,
-    /// True for each condition whose signal was on in the previous tick; `None` before the first.
-    pub(crate) were_on: Vec<Option<bool>>,
+    /// The slot of each condition's signal in the previous tick; `None` before the first.
+    pub(crate) before: Vec<Option<Slot>>,
 }
 
 impl Ruled {
     pub(crate) fn step(&mut self, io: &mut Io<'_>) -> Nanos {
         let mut holds = true;
         for (place, (condition, form)) in self.rule.when.iter().zip(&self.forms).enumerate() {
-            let value = form.real(io.slots[condition.signal]);
-            let is_on = value != 0.0;
-            let before = self.were_on[place].replace(is_on).unwrap_or(is_on);
-            holds &= match condition.demand {
-                Demand::Rises => is_on && !before,
-                Demand::Falls => before && !is_on,
-                _ => condition.holds_for(value, io.slots),
+            let slot = io.slots[condition.signal];
+            let value = form.real(slot);
+            let before = self.before[place].replace(slot).unwrap_or(slot);
+            holds &= if condition.is_edge() {
+                condition.holds_between((before, form.real(before)), (slot, value))
+            } else {
+                condition.holds_for(value, io.slots)
             };
         }
         let moment = (io.now, io.passed);

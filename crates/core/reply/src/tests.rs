@@ -321,6 +321,25 @@ fn lamps_blink_and_life_signs_count_or_repeat() {
 }
 
 #[test]
+fn a_rule_takes_effect_at_each_change_of_a_number() {
+    let mut machine = Machine::new(
+        "[[reply]]\nkind = \"rule\"\nwhen = \"N changes\"\nset = { a = true }\n\
+         [[reply]]\nkind = \"rule\"\nwhen = \"A\"\nset = { a = false }\n",
+    );
+    // The value of the first tick is no change.
+    machine.set("N", 5.0);
+    assert_eq!(machine.values("a", 2), "0 0");
+    for value in [6.0, 5.0] {
+        machine.set("N", value);
+        assert_eq!(machine.values("a", 2), "1 1");
+        machine.set("A", 1.0);
+        assert_eq!(machine.values("a", 1), "0");
+        machine.set("A", 0.0);
+        machine.tick();
+    }
+}
+
+#[test]
 fn rules_set_and_clear_one_signal_and_move_another_also_under_a_simulation_that_hands_over_zeros() {
     let mut machine = Machine::new(
         "[[reply]]\nkind = \"rule\"\nwhen = \"A rises\"\nset = { a = true }\n\
@@ -555,7 +574,7 @@ fn wrong_sections_are_refused_at_their_place() {
         ),
         (
             "kind = \"follows\"\nsignal = \"a\"\nwhen = \"B rises\"",
-            "x:4:8: a reply waits for no edge, which is over at once; write the condition without \"rises\" or \"falls\"; a \
+            "x:4:8: a reply waits for no edge, which is over at once; write the condition without \"rises\", \"falls\" or \"changes\"; a \
              counter counts how often it begins to hold",
         ),
         (
@@ -597,7 +616,7 @@ fn wrong_sections_are_refused_at_their_place() {
         ),
         (
             "kind = \"rule\"\nwhen = \"A rises\"\nset = { a = true }\nelse = { a = false }",
-            "x:5:8: an edge has no \"else\": it is over at once; write the condition without \"rises\" or \"falls\", or a second rule",
+            "x:5:8: an edge has no \"else\": it is over at once; write the condition without \"rises\", \"falls\" or \"changes\", or a second rule",
         ),
         (
             "kind = \"rule\"\nwhen = \"A\"\nset = { A = true }",

@@ -174,6 +174,9 @@ const analyser = (() => {
       track.parts.remove.addEventListener("click", () => remove(track));
       return item;
     }));
+    // Without a signal on the axis it is in the view of the recording alone.
+    if (tracks.length) get("plot-keys").before(get("trigger"));
+    else get("no-tracks").append(get("trigger"));
     trigger.choices(tracks.map(({ signal }) => signal));
     fit();
     collect();
@@ -352,12 +355,14 @@ const analyser = (() => {
     changed();
   }
 
-  /** Stops the view at the moment of the trigger, in the time of its driver. */
-  function stop(driver, ms) {
-    const time = ms - bar.offset(driver);
-    look(time - span / 2, span);
-    pending = { ms: time };
-    bar.show(`at/${time}`, false, driver === bar.lead ? null : { driver, place: `at/${ms}`, ms: time });
+  /** Stops the view at the tick of the trigger. */
+  function stop(driver, found) {
+    const time = found.ms - bar.offset(driver);
+    if (tracks.length) {
+      look(time - span / 2, span);
+      pending = { ms: time };
+    }
+    bar.reach(driver, found, false);
   }
 
   // Drawing.

@@ -9,14 +9,16 @@ use tickbus_base::time::Nanos;
 use tickbus_driver::Force;
 use tickbus_fieldbus::faults::{FaultStatus, Lasts, Phase};
 use tickbus_fieldbus::{Link, LinkState};
-use tickbus_image::signal::{Area, SignalTable};
-use tickbus_record::{Goal, History, Moment, Span, Tick};
+use tickbus_image::signal::{Area, Signal, SignalTable};
+use tickbus_record::{History, Moment, Span, Tick};
 
 use crate::codec::Codec;
 use crate::sheet::{ChangeJson, FAIL_SAFE, FORCED, Row, STALE};
 
 mod forces;
+mod jump;
 mod moments;
+mod when;
 
 /// The most faults and states of the line that are remembered.
 const MOST: usize = 10_000;
@@ -56,6 +58,8 @@ struct Notes {
     /// By the numbers of the faults.
     forces: BTreeMap<u32, Force>,
     lines: VecDeque<LineNote>,
+    /// The forces of all ticks up to this one are known; `None` if there are no forces.
+    known: Option<u64>,
 }
 
 /// A fault as last seen.
@@ -129,6 +133,11 @@ impl Archive {
         }
     }
 
+    /// The number of the last tick.
+    pub(crate) fn last(&self) -> u64 {
+        self.history.span().map_or(0, |span| span.last.0)
+    }
+
     fn notes(&self) -> MutexGuard<'_, Notes> {
         // Each list is consistent after every single change.
         self.notes.lock().unwrap_or_else(PoisonError::into_inner)
@@ -144,10 +153,10 @@ impl Archive {
         }
     }
 
-    /// Notes the faults that have begun or ended. Their ticks count from the last reset, and the history has `before`
-    /// ticks from before it.
-    pub(crate) fn note_faults(&self, faults: &[FaultStatus], before: u64) {
-        let last = self.history.span().map_or(0, |span| span.last.0);
+    /// Notes the faults that have begun or ended, as known after the history had the tick `known`. Their ticks count
+    /// from the last reset, and the history has `before` ticks from before it.
+    pub(crate) fn note_faults(&self, faults: &[FaultStatus], before: u64, known: u64) {
+        let last = self.last();
         // Looked for without the lock, since that decodes a part of the history.
         let pulses: Vec<Option<u64>> = faults
             .iter()
@@ -221,6 +230,7 @@ impl Archive {
         if seen.len() > MOST {
             seen.drain(..MOST / 2);
         }
+        notes.known = Some(known);
     }
 
     /// The tick of the history in which a force that is over and lasted for a given time began.
@@ -403,6 +413,13 @@ impl Archive {
         self.facts.reads.is_some_and(|reads| reads != area)
     }
 
+    /// The column of a signal in the history, and the station whose stale data have no value.
+    pub(crate) fn column(&self, signal: usize) -> (usize, Option<usize>) {
+        let Signal { area, station, .. } = self.facts.table.signals[signal];
+        let can_be_stale = self.facts.reads.is_none_or(|reads| reads == area);
+        (signal, can_be_stale.then_some(station))
+    }
+
     /// The rows of a tick.
     fn rows(&self, tick: &Tick, faults: &[Mark]) -> Vec<Row> {
         let table = &self.facts.table;
@@ -496,37 +513,6 @@ impl Archive {
         // Writing to a String cannot fail.
         let _ = write!(text, ",\"values\":{values}}}");
         Some(text)
-    }
-
-    /// The next tick after this one that has what was asked for, or the last one before it; `None` if that is unknown.
-    pub(crate) fn jump(&self, what: &str, is_forward: bool, from: u64) -> Option<String> {
-        let found = match what {
-            "outage" => self.history.search(from, is_forward, Goal::Outage),
-            "fault" => {
-                let marks = self.notes().marks.clone();
-                let aside = |mark: &&Mark| {
-                    mark.begins && mark.tick != from && (mark.tick > from) == is_forward
-                };
-                let mut ticks: Vec<u64> =
-                    marks.iter().filter(aside).map(|mark| mark.tick).collect();
-                ticks.sort_unstable();
-                let tick = if is_forward {
-                    ticks.first()
-                } else {
-                    ticks.last()
-                };
-                let tick = tick.and_then(|tick| self.history.at(Moment::Tick(*tick)));
-                tick.map(|tick| (tick.number, tick.time))
-                    .filter(|(number, _)| *number != from && (*number > from) == is_forward)
-            }
-            index => {
-                let index = index.parse().ok()?;
-                self.facts.table.signals.get(index)?;
-                self.history.search(from, is_forward, Goal::Change(index))
-            }
-        };
-        let found = found.map(|(tick, time)| json!({ "tick": tick, "ms": millis(time) }));
-        Some(found.unwrap_or_else(|| json!({ "tick": null })).to_string())
     }
 }
 

@@ -128,29 +128,36 @@ const bar = (() => {
     show(by < 0 ? `tick/${from - 1}` : `after/${from}`, true);
   }
 
-  /** Goes to the next outage, fault or change, or to the last one. */
-  async function jump(isForward) {
+  /** How much later a driver's time is than the lead's, in milliseconds. */
+  const offset = (driver) => (driver === lead || !driver.past ? 0 : moment ? offsets.get(driver.id) ?? 0 : lag(driver));
+
+  /** Shows a tick of a driver, `{ tick, ms }`; in the lead's time, if it is another driver's. */
+  function reach(driver, found, isStep) {
+    if (driver === lead) return show(`tick/${found.tick}`, isStep);
+    const ms = found.ms - offset(driver);
+    return show(`at/${ms}`, isStep, { driver, place: `tick/${found.tick}`, ms });
+  }
+
+  /** Goes to the next outage, fault, change or condition, or to the last one. */
+  async function jump(isForward, goal = get("goal").value) {
     if (!lead) return;
-    const goal = get("goal").value;
     const signal = act.chosen();
     if (goal === "signal" && !signal) return act.say("Choose the signal whose change you look for.", true);
-    const driver = goal === "signal" ? signal.driver : lead;
+    const when = goal === "when" ? act.when() : null;
+    const driver = when?.driver ?? (goal === "signal" ? signal.driver : lead);
     // The present is later than what the page has heard of.
     const from = driver.moment?.tick ?? Number.MAX_SAFE_INTEGER;
     const what = goal === "signal" ? signal.index : goal;
-    const name = goal === "signal" ? `change of ${signal.name}` : goal;
+    const name = when ? `beginning of “${when.text}”` : goal === "signal" ? `change of ${signal.name}` : goal;
     try {
-      const answer = await room.ask(path(driver, `${isForward ? "next" : "last"}/${what}/${from}`));
+      const answer = await room.ask(path(driver, `${isForward ? "next" : "last"}/${what}/${from}${when ? `/${encodeURIComponent(when.text)}` : ""}`));
       const found = await answer.json();
       if (!answer.ok) return act.say(found.text, true);
+      if (when) act.wrong(found.wrong ?? "");
+      if (found.wrong) return;
       if (found.tick === null) return act.say(`There is no ${isForward ? "later" : "earlier"} ${name} in the recorded time.`, true);
       act.say("");
-      // In the lead's time, if the signal is another driver's.
-      if (driver === lead) await show(`tick/${found.tick}`, true);
-      else {
-        const ms = found.ms - (offsets.get(driver.id) ?? lag(driver));
-        await show(`at/${ms}`, true, { driver, place: `tick/${found.tick}`, ms });
-      }
+      await reach(driver, found, true);
     } catch {
       act.say("Nobody answers; look at the values when the page is live again.", true);
     }
@@ -275,6 +282,8 @@ const bar = (() => {
   get("step-forth").addEventListener("click", () => step(1));
   get("last-goal").addEventListener("click", () => jump(false));
   get("next-goal").addEventListener("click", () => jump(true));
+  get("last-when").addEventListener("click", () => jump(false, "when"));
+  get("next-when").addEventListener("click", () => jump(true, "when"));
   get("save").addEventListener("click", (event) => {
     const ending = event.target.closest("button")?.dataset.ending;
     if (ending) save(ending);
@@ -297,13 +306,11 @@ const bar = (() => {
 
   setInterval(look, PERIOD);
   return {
-    redraw, key, show, live, step, jump, frames,
-    /** Sets what the page does: `say(text, isBad)`, `shown()`, `chosen()`. */
+    redraw, key, show, live, step, jump, reach, offset, frames,
+    /** Sets what the page does: `say(text, isBad)`, `shown()`, `chosen()`, `when()`, `wrong(text)`. */
     begin(actions) { act = actions; },
     get moment() { return moment; },
     /** The driver whose time the bar shows. */
     get lead() { return lead; },
-    /** How much later a driver's time is than the lead's, in milliseconds. */
-    offset: (driver) => (driver === lead || !driver.past ? 0 : moment ? offsets.get(driver.id) ?? 0 : lag(driver)),
   };
 })();

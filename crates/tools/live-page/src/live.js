@@ -132,6 +132,11 @@
   bar.begin({
     say,
     chosen: () => list.chosen,
+    when: trigger.wanted,
+    wrong(text) {
+      trigger.tell(text);
+      if (!get("trigger-text").checkVisibility()) say(text && `${text}. The condition is written under Recording.`, true);
+    },
     shown() {
       line.show();
       if (list.kind === "forced" || list.kind === "failsafe") list.choose();
@@ -146,6 +151,7 @@
     chosen(signal) {
       showChosen(signal);
       touch.show();
+      trigger.offer();
     },
     force: edit,
     release,
@@ -175,7 +181,7 @@
   });
   pads.begin({ release });
   analyser.begin({ say, redraw });
-  trigger.begin({ say, follow: analyser.follow, stop: analyser.stop });
+  trigger.begin({ say, follow: analyser.follow, stop: analyser.stop, chosen: () => list.chosen });
 
   get("chosen").addEventListener("submit", (event) => {
     event.preventDefault();

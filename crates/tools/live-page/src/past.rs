@@ -125,6 +125,9 @@ fn document(model: &Shared, path: &str) -> Option<Document> {
         }
         ["next", what, tick] => archive.jump(what, true, tick.parse().ok()?)?,
         ["last", what, tick] => archive.jump(what, false, tick.parse().ok()?)?,
+        [way @ ("next" | "last"), "when", tick, conditions] => {
+            archive.when(conditions, way == "next", tick.parse().ok()?)
+        }
         ["save", from, file] => {
             let id = id.parse().ok()?;
             let title = model.with(|model| model.driver(id).map(|it| it.name().to_owned()))?;

@@ -181,7 +181,9 @@ impl Shown {
         if let Some(archive) = &self.archive {
             archive.note_line(&link, self.watch.clock().now());
             let before = self.watch.view(|view| view.recorded_before);
-            archive.note_faults(&self.watch.faults(), before);
+            // Taken first: the faults are those of this tick, or of a later one.
+            let known = archive.last();
+            archive.note_faults(&self.watch.faults(), before, known);
         }
         let is_other = (link.state, link.cause) != (self.link.state, self.link.cause)
             || (link.state == LinkState::Opening && link.reason != self.link.reason)

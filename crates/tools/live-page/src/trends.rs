@@ -106,14 +106,8 @@ fn collect(
     most: usize,
 ) -> Vec<Points> {
     let signals = &archive.facts.table.signals;
-    let wanted: Vec<(usize, Option<usize>)> = indices
-        .iter()
-        .map(|index| {
-            let signal = &signals[*index];
-            let can_be_stale = archive.facts.reads.is_none_or(|reads| reads == signal.area);
-            (*index, can_be_stale.then_some(signal.station))
-        })
-        .collect();
+    let wanted: Vec<(usize, Option<usize>)> =
+        indices.iter().map(|index| archive.column(*index)).collect();
     let value = |index: usize, slot: Option<_>| {
         slot.map_or(f64::NAN, |slot| Number::of(&signals[index], slot).real())
     };

@@ -1,34 +1,30 @@
 "use strict";
 
-// The trigger of the analyser: it stops the view at the tick in which a signal does what was asked for.
+// The conditions of the analyser: the view stops at the next tick at which they begin to hold, or jumps to such a tick. The
+// server looks for it, in every tick.
 
 const trigger = (() => {
+  const { write } = elements;
   const get = (id) => document.getElementById(id);
+  const [field, insert] = [get("trigger-text"), get("trigger-insert")];
   /** The time between two looks, in milliseconds. */
   const PERIOD = 100;
-  /** Later than any tick, in milliseconds: a page in the background hears of no newer ones, and yet the trigger sees them. */
-  const FAR = 1e12;
-  /** By name: whether a change from one value to another is meant, and the words for it. A time without a value is NaN. */
-  const CASES = {
-    rises: { fits: (was, is) => is > was, done: "rose" },
-    falls: { fits: (was, is) => is < was, done: "fell" },
-    changes: { fits: (was, is) => !Number.isNaN(was) && !Number.isNaN(is), done: "changed" },
-    above: { fits: (was, is, limit) => is > limit && !(was > limit), done: "went above", hasLimit: true },
-    below: { fits: (was, is, limit) => is < limit && !(was < limit), done: "went below", hasLimit: true },
-    equals: { fits: (was, is, limit) => is === limit && was !== limit, done: "became", hasLimit: true },
-  };
+  /** The most signals that are offered where none is on the axis. */
+  const ROOM = 24;
   let act = {};
   let signals = [];
-  /** What is waited for: `{ signal, name, limit, until, was }`; null while it is off. */
+  /** The id of the driver whose condition was inserted last. */
+  let near = null;
+  /** What is waited for: `{ id, text, until }`, a driver's id and the last tick that was looked at; null while it is off. */
   let armed = null;
 
-  const hasLimit = () => CASES[get("trigger-case").value].hasLimit === true;
+  const driverOf = (id) => plant.drivers.find((driver) => driver.id === id);
 
   function show() {
-    get("trigger-limit").hidden = !hasLimit();
+    get("arm").hidden = plant.drivers.some(({ isRecording }) => isRecording);
     get("arm").setAttribute("aria-pressed", String(armed !== null));
     get("arm").textContent = armed ? "Waits – cancel" : "Wait for it";
-    for (const id of ["trigger-signal", "trigger-case", "trigger-limit"]) get(id).disabled = armed !== null;
+    field.readOnly = insert.disabled = armed !== null;
   }
 
   function disarm() {
@@ -36,91 +32,105 @@ const trigger = (() => {
     show();
   }
 
-  function arm() {
-    const signal = signals.find((it) => plant.keyOf(it) === get("trigger-signal").value);
-    if (!signal?.driver.past) return act.say("Put a signal on the axis first.", true);
-    if (signal.driver.isRecording) return act.say("A recording has ended: go to its edges with “edge ▸”, or with “Jump to”.", true);
-    const text = get("trigger-limit").value.trim().replace(",", ".").replace("−", "-");
-    const bools = { TRUE: 1, FALSE: 0 };
-    const limit = hasLimit() ? (bools[text.toUpperCase()] ?? (text === "" ? NaN : Number(text))) : 0;
-    if (Number.isNaN(limit)) {
-      get("trigger-limit").focus();
-      return act.say(`"${text}" is not a number; write one such as 12.5.`, true);
+  /** Shows what is wrong with the text, at its field. */
+  function tell(text) {
+    write(get("trigger-told"), text);
+    field.setAttribute("aria-invalid", String(text !== ""));
+    if (text) field.focus();
+  }
+
+  /** The text, and the driver that it is about: the one with the longest name in it. */
+  function wanted() {
+    const text = field.value.trim();
+    let [best, longest] = [null, -1];
+    for (const driver of [driverOf(near), act.chosen()?.driver, bar.lead, ...plant.drivers]) {
+      if (!driver?.past) continue;
+      const length = driver.signals.reduce((most, { name }) => (text.includes(name) ? Math.max(most, name.length) : most), 0);
+      if (length > longest) [best, longest] = [driver, length];
     }
-    armed = { signal, name: get("trigger-case").value, limit, until: signal.driver.past.last, was: NaN };
+    return { driver: best, text };
+  }
+
+  async function next({ id, text, until }) {
+    const answer = await room.ask(`/history/${id}/next/when/${until}/${encodeURIComponent(text)}`);
+    return answer.ok ? answer.json() : null;
+  }
+
+  async function arm() {
+    const { driver, text } = wanted();
+    const own = { id: driver.id, text, until: driver.past.tick };
+    const found = await next(own).catch(() => null);
+    if (!found) return act.say("Nobody answers; wait until the page is live again.", true);
+    tell(found.wrong ?? "");
+    if (found.wrong) return;
+    armed = own;
     act.follow();
     act.say("The view stops when it happens.");
     show();
   }
 
-  /** Looks at all changes since the last look. */
+  /** Looks at all ticks since the last look. */
   async function look() {
     const own = armed;
-    // Of too many changes the server has the extremes alone: it is asked again, for shorter times.
-    for (let to = FAR; own && armed === own;) {
-      const { driver, index } = own.signal;
-      const answer = await room.ask(`/trend/${driver.id}/${index}/${own.until}/${to}`);
-      if (!answer.ok || armed !== own) return;
-      const news = await answer.json();
-      const given = news.signals[index];
-      const next = given.ms.find((ms) => ms > own.until);
-      if (given.is_thin && next < given.ms.at(-1)) {
-        to = Math.max(next, given.ms[given.ms.length >> 2]);
-        continue;
-      }
-      if (given.ms[0] > own.until) {
-        act.say("Waits on; but the oldest changes have left the memory (history in [page]), and the signal may have done it among them.", true);
-        own.was = NaN;
-      }
-      take(own, news.to_ms, given);
-      if (to === FAR) return;
-      to = FAR;
+    const found = own && await next(own);
+    if (!found || armed !== own) return;
+    const lost = "the oldest changes have left the memory (history in [page])";
+    if (found.wrong) {
+      disarm();
+      tell(found.wrong);
+    } else if (found.tick !== null) {
+      disarm();
+      act.stop(driverOf(own.id), found);
+      act.say(`${own.text}: at ${words.moment(found.ms)}; the view has stopped there.${found.is_cut ? ` It may have happened before: ${lost}.` : ""}`, found.is_cut);
+    } else {
+      if (found.is_cut) act.say(`Waits on; but ${lost}, and it may have happened among them.`, true);
+      // After a restart the ticks begin again.
+      own.until = found.until < own.until ? 0 : found.until;
     }
   }
 
-  function take(own, until, { ms, values }) {
-    const { fits, done, hasLimit } = CASES[own.name];
-    for (let i = 0; i < ms.length; i++) {
-      const is = values[i] ?? NaN;
-      if (ms[i] > own.until && fits(own.was, is, own.limit)) {
-        disarm();
-        act.stop(own.signal.driver, ms[i]);
-        const unit = own.signal.unit ? ` ${own.signal.unit}` : "";
-        const limit = hasLimit ? ` ${own.limit}${unit}` : "";
-        return act.say(`${own.signal.name} ${done}${limit} at ${words.moment(ms[i])}; the view has stopped there.`);
-      }
-      own.was = is;
-    }
-    own.until = Math.max(own.until, until);
+  /** Offers the conditions on the signals of the axis and the chosen one; without any, on the first ones of the list. */
+  function offer() {
+    const own = new Set([...signals, act.chosen()].filter((it) => it?.driver.past));
+    const all = own.size ? [...own] : plant.signals.slice(0, ROOM);
+    insert.replaceChildren(new Option("Insert…", ""), ...all.flatMap(({ name, isBool, driver }) => (isBool ? ["", "not ", " rises", " falls", " changes"] : [" changes", " > ", " < ", " == "]).map((it) => {
+      const option = new Option(it === "not " ? it + name : name + it);
+      option.driver = driver.id;
+      return option;
+    })));
   }
 
-  get("trigger-case").addEventListener("change", show);
+  insert.addEventListener("change", () => {
+    const option = insert.selectedOptions[0];
+    near = option.driver;
+    field.value = (field.value.trim() ? `${field.value.trim()} and ` : "") + option.text;
+    // A number is written behind a sign.
+    if (/[<>=]$/.test(field.value)) field.value += " ";
+    insert.value = "";
+    tell("");
+    field.focus();
+  });
+  field.addEventListener("input", () => tell(""));
   get("trigger").addEventListener("submit", (event) => {
     event.preventDefault();
     if (armed) disarm();
+    else if (get("arm").hidden) bar.jump(true, "when");
     else arm();
   });
 
   room.every(PERIOD, look);
   return {
-    /** Sets what the page does: `say(text, isBad)`, `follow()`, `stop(driver, ms)`. */
+    wanted, tell, offer,
+    /** Sets what the page does: `say(text, isBad)`, `follow()`, `stop(driver, { tick, ms })`, `chosen()`. */
     begin(actions) { act = actions; },
-    /** The signals that it can wait for. */
+    /** The signals on the axis have changed, or all drivers were replaced. */
     choices(given) {
       signals = given;
-      if (armed) {
-        armed.signal = signals.find((it) => plant.keyOf(it) === plant.keyOf(armed.signal)) ?? null;
-        if (!armed.signal) {
-          act.say("The trigger's signal has left the axis; it waits no more.", true);
-          disarm();
-        }
-        // After a restart the time begins again.
-        const last = armed?.signal.driver.past?.last ?? 0;
-        if (armed && last < armed.until) Object.assign(armed, { until: last, was: NaN });
+      if (armed && !driverOf(armed.id)) {
+        act.say("The driver has left the page; nothing is waited for any more.", true);
+        armed = null;
       }
-      const chosen = get("trigger-signal").value;
-      get("trigger-signal").replaceChildren(...signals.map((signal) => new Option(signal.name, plant.keyOf(signal))));
-      if (signals.some((signal) => plant.keyOf(signal) === chosen)) get("trigger-signal").value = chosen;
+      offer();
       show();
     },
     get isArmed() { return armed !== null; },

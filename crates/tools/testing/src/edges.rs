@@ -10,6 +10,7 @@ use super::watch::Watch;
 pub(super) struct Bookmark {
     rises: u64,
     falls: u64,
+    changes: u64,
 }
 
 impl Bookmark {
@@ -17,6 +18,7 @@ impl Bookmark {
         Self {
             rises: watch.rises(),
             falls: watch.falls(),
+            changes: watch.changes(),
         }
     }
 
@@ -26,7 +28,31 @@ impl Bookmark {
         match &condition.demand {
             Demand::Rises => watch.rises() > self.rises,
             Demand::Falls => watch.falls() > self.falls,
+            Demand::Changes => watch.changes() > self.changes,
             _ => condition.holds_for(watch.value(), slots),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tickbus_image::signal::{Area, DataType, Signal, SignalTable};
+
+    use super::*;
+
+    #[test]
+    fn a_change_counts_from_the_bookmark_on() {
+        let phase = Signal::new("Phase", Area::Output, 0, DataType::Int);
+        let table = SignalTable::of_one_station(2, 2, vec![phase.clone()]);
+        let condition = Condition::parse("Phase changes", &table).expect("a condition");
+        let slots = [3.0, 4.0, 3.0].map(Slot::from_real);
+        let mut watch = Watch::new(slots[0], &phase);
+        let begin = Bookmark::of(&watch);
+        watch.look(slots[0], &phase, 1);
+        assert!(!begin.finds(&condition, &watch, &slots[..1]));
+        watch.look(slots[1], &phase, 2);
+        watch.look(slots[2], &phase, 3);
+        assert!(begin.finds(&condition, &watch, &slots[2..]));
+        assert!(!Bookmark::of(&watch).finds(&condition, &watch, &slots[2..]));
     }
 }

@@ -99,6 +99,10 @@ impl Watch {
         self.falls
     }
 
+    pub(super) const fn changes(&self) -> u64 {
+        self.changes
+    }
+
     /// The last changes as one line.
     pub(super) fn history(&self, signal: &Signal, step: Nanos) -> String {
         let head = format!(

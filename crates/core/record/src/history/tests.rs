@@ -133,6 +133,28 @@ proptest! {
             }
         }
         prop_assert_eq!(history.trend(column, Some(station), (from, to)), expected);
+        // By their numbers: every tick in which it changes, or every one.
+        let from = ticks[ticks.len() / 3].number;
+        for is_every in [false, true] {
+            let mut expected: Vec<(u64, Option<Slot>)> = Vec::new();
+            for tick in &ticks {
+                let value = (!is_stale(tick.stations[station])).then(|| tick.values[column]);
+                if tick.number <= from {
+                    expected = vec![(tick.number, value)];
+                } else if is_every || expected.last().is_none_or(|(_, last)| *last != value) {
+                    expected.push((tick.number, value));
+                }
+            }
+            let mut found = Vec::new();
+            history.follow(&[(column, Some(station))], (from, is_every), |(number, _), values| {
+                found.push((number, values[0]));
+                true
+            });
+            // The first value may come from any tick of a block in which nothing changes.
+            let skip = usize::from(!is_every);
+            prop_assert_eq!(&found[skip..], &expected[skip..]);
+            prop_assert_eq!(found[0].1, expected[0].1);
+        }
     }
 
     #[test]

@@ -213,7 +213,7 @@ impl<'a> Reader<'a> {
         self.inputs.borrow_mut().extend(inputs);
         let ruled = Ruled {
             forms: forms.collect(),
-            were_on: vec![None; rule.when.len()],
+            before: vec![None; rule.when.len()],
             course: Course::default(),
             rule,
         };
@@ -225,7 +225,7 @@ impl<'a> Reader<'a> {
         if condition.is_edge() {
             value.wrong(
                 "a reply waits for no edge, which is over at once",
-                "write the condition without \"rises\" or \"falls\"; a counter counts how often it begins to hold",
+                "write the condition without \"rises\", \"falls\" or \"changes\"; a counter counts how often it begins to hold",
             );
             return None;
         }

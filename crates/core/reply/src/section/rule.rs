@@ -64,7 +64,7 @@ impl<'a> RuleKeys<'_, 'a> {
         {
             value.wrong(
                 "an edge has no \"else\": it is over at once",
-                "write the condition without \"rises\" or \"falls\", or a second rule",
+                "write the condition without \"rises\", \"falls\" or \"changes\", or a second rule",
             );
         }
         let otherwise = signals.placed_assignments(self.otherwise);

@@ -30,7 +30,7 @@ impl Archive {
 
     /// The value of a signal that is forced since a time, at another time; `own` is the value without the force when it
     /// began.
-    fn forced(&self, force: Force, own: Option<Slot>, passed: Nanos) -> Option<Slot> {
+    pub(super) fn forced(&self, force: Force, own: Option<Slot>, passed: Nanos) -> Option<Slot> {
         match force.effect {
             SignalEffect::Stuck(value) => value,
             SignalEffect::Ramp { to, within, .. } if passed >= within => Some(to),

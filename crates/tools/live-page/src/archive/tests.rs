@@ -78,11 +78,11 @@ fn marks(archive: &Archive) -> Vec<(u64, f64, bool)> {
 #[test]
 fn a_fault_after_a_reset_is_where_the_history_has_it() {
     let archive = archive();
-    archive.note_faults(&[forced(1, Phase::Active, 1, 3)], 0);
+    archive.note_faults(&[forced(1, Phase::Active, 1, 3)], 0, 20);
     // A reset after the tenth tick ends the force, in no tick, and the ticks count from 1 again.
     let over = forced(1, Phase::Over, 1, 0);
-    archive.note_faults(&[over.clone(), forced(2, Phase::Waiting, 0, 0)], 10);
-    archive.note_faults(&[over, forced(2, Phase::Active, 1, 4)], 10);
+    archive.note_faults(&[over.clone(), forced(2, Phase::Waiting, 0, 0)], 10, 20);
+    archive.note_faults(&[over, forced(2, Phase::Active, 1, 4)], 10, 20);
     let expected = [(3, 3.0, true), (11, 11.0, false), (14, 14.0, true)];
     assert_eq!(marks(&archive), expected);
     let is_forced = |tick: u64| !archive.faults_at(tick).is_empty();
@@ -95,9 +95,9 @@ fn a_fault_after_a_reset_is_where_the_history_has_it() {
 #[test]
 fn a_force_that_a_reset_ends_was_on_until_then() {
     let archive = archive();
-    archive.note_faults(&[forced(1, Phase::Active, 1, 3)], 0);
+    archive.note_faults(&[forced(1, Phase::Active, 1, 3)], 0, 20);
     // The page looks before the first tick after the reset.
-    archive.note_faults(&[forced(1, Phase::Over, 1, 0)], 0);
+    archive.note_faults(&[forced(1, Phase::Over, 1, 0)], 0, 20);
     let is_forced = |tick: u64| !archive.faults_at(tick).is_empty();
     assert_eq!([2, 3, 20, 21].map(is_forced), [false, true, true, false]);
 }
@@ -105,9 +105,9 @@ fn a_force_that_a_reset_ends_was_on_until_then() {
 #[test]
 fn a_fault_that_is_over_before_the_page_looks_is_marked_and_found() {
     let archive = archive();
-    archive.note_faults(&[forced(1, Phase::Waiting, 0, 0)], 0);
-    archive.note_faults(&[forced(1, Phase::Over, 1, 7)], 0);
-    archive.note_faults(&[forced(1, Phase::Over, 1, 7)], 0);
+    archive.note_faults(&[forced(1, Phase::Waiting, 0, 0)], 0, 20);
+    archive.note_faults(&[forced(1, Phase::Over, 1, 7)], 0, 20);
+    archive.note_faults(&[forced(1, Phase::Over, 1, 7)], 0, 20);
     assert_eq!(marks(&archive), [(7, 7.0, true), (7, 7.0, false)]);
     let found = archive.jump("fault", true, 1).expect("known");
     assert!(found.contains("\"tick\":7"), "{found}");
@@ -117,9 +117,9 @@ fn a_fault_that_is_over_before_the_page_looks_is_marked_and_found() {
 #[test]
 fn a_mark_keeps_its_time() {
     let archive = archive();
-    archive.note_faults(&[forced(1, Phase::Active, 1, 5)], 0);
+    archive.note_faults(&[forced(1, Phase::Active, 1, 5)], 0, 20);
     // The recorder may not have the tick yet.
-    archive.note_faults(&[forced(2, Phase::Active, 1, 21)], 0);
+    archive.note_faults(&[forced(2, Phase::Active, 1, 21)], 0, 20);
     assert_eq!(marks(&archive), [(5, 5.0, true)]);
     let times = |archive: &Archive| -> Vec<Option<Nanos>> {
         archive.notes().marks.iter().map(|mark| mark.at).collect()
@@ -141,19 +141,19 @@ fn a_forced_value_takes_the_place_of_the_one_that_the_simulation_wrote() {
     let first = own[0];
     archive.note_force(1, Way::Hold.force(0, slot(5.0), None));
     archive.note_force(2, Way::Hold.force(0, slot(6.0), None));
-    archive.note_faults(&[forced(1, Phase::Active, 1, 3)], 0);
+    archive.note_faults(&[forced(1, Phase::Active, 1, 3)], 0, 20);
     let to_six = FaultStatus {
         what: "\"a\" is stuck at 6".to_owned(),
         ..forced(2, Phase::Active, 1, 8)
     };
     // The second takes the place of the first in one tick.
-    archive.note_faults(&[forced(1, Phase::Over, 1, 8), to_six.clone()], 0);
+    archive.note_faults(&[forced(1, Phase::Over, 1, 8), to_six.clone()], 0, 20);
     let over = FaultStatus {
         phase: Phase::Over,
         tick: 12,
         ..to_six
     };
-    archive.note_faults(&[over], 0);
+    archive.note_faults(&[over], 0, 20);
     let (five, six) = (Some(slot(5.0)), Some(slot(6.0)));
     let whole = [first, (ms(3), five), (ms(8), six), (ms(12), first.1)];
     assert_eq!(trend(0, 30), whole);
@@ -183,7 +183,7 @@ fn a_ramp_goes_evenly_and_one_tick_is_one_tick_however_rarely_the_page_looks() {
     };
     let up = Way::Ramp(ms(10)).force(0, Slot::from_real(100.0), None);
     archive.note_force(1, up);
-    archive.note_faults(&[forced(1, Phase::Active, 1, 3)], 0);
+    archive.note_faults(&[forced(1, Phase::Active, 1, 3)], 0, 20);
     let points = trend(0, 30);
     assert_eq!(points.len(), 101, "{points:?}");
     assert!(points.contains(&(8_000_000, 50.0)), "{points:?}");
@@ -200,17 +200,17 @@ fn a_ramp_goes_evenly_and_one_tick_is_one_tick_however_rarely_the_page_looks() {
     // A request that begins after the ramp began.
     assert_eq!(trend(8, 30)[0], (8_000_000, 50.0));
     // Released on its way.
-    archive.note_faults(&[forced(1, Phase::Over, 1, 8)], 0);
+    archive.note_faults(&[forced(1, Phase::Over, 1, 8)], 0, 20);
     assert_eq!(trend(0, 30).last(), Some(&(8_000_000, 0.0)));
     archive.note_force(2, Way::Once.force(0, Slot::from_real(7.0), None));
-    archive.note_faults(&[forced(2, Phase::Over, 1, 16)], 0);
+    archive.note_faults(&[forced(2, Phase::Over, 1, 16)], 0, 20);
     assert_eq!(
         trend(14, 30),
         [(14_000_000, 0.0), (15_000_000, 7.0), (16_000_000, 0.0)]
     );
     // A pulse that begins and ends between two looks.
     archive.note_force(3, Way::Pulse(ms(2)).force(0, Slot::from_real(9.0), None));
-    archive.note_faults(&[forced(3, Phase::Over, 1, 19)], 0);
+    archive.note_faults(&[forced(3, Phase::Over, 1, 19)], 0, 20);
     assert_eq!(
         trend(16, 30),
         [(16_000_000, 0.0), (17_000_000, 9.0), (19_000_000, 0.0)]
@@ -243,7 +243,7 @@ fn a_moment_has_the_line_and_the_events_before_it() {
         ..forced(1, Phase::Active, 12, 12)
     };
     // A push-button that is held is no event of the line.
-    archive.note_faults(&[leak, forced(2, Phase::Active, 13, 13)], 0);
+    archive.note_faults(&[leak, forced(2, Phase::Active, 13, 13)], 0, 20);
     let kinds = |millis| {
         let tick = u64::try_from(millis).expect("a tick a millisecond");
         let line = archive.line_at((tick, Nanos::from_millis(millis)))?;

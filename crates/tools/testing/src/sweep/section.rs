@@ -379,7 +379,8 @@ impl Reader<'_> {
 }
 
 fn is_edge(text: &str) -> bool {
-    text.ends_with(" rises") || text.ends_with(" falls")
+    let endings = [" rises", " falls", " changes"];
+    endings.iter().any(|ending| text.ends_with(ending))
 }
 
 /// These faults, and each two of them of different signals or stations.

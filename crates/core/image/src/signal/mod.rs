@@ -16,5 +16,5 @@ pub use plan::{Conversions, Plan, fail_safe_frame};
 pub use raw::RawValues;
 pub use scale::Scale;
 pub use slot::Slot;
-pub use table::{Latch, Signal, SignalTable, Station, Structure};
+pub use table::{Latch, Notes, Signal, SignalTable, Station, Structure};
 pub use types::{DataType, UnknownType};

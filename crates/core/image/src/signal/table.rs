@@ -16,6 +16,15 @@ pub enum Latch {
     Both,
 }
 
+/// Texts about a signal, for people; each may be empty.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Notes {
+    /// The comment, as in the PLC's project.
+    pub comment: String,
+    /// The tag table, list or program of the PLC's project that has the signal.
+    pub folder: String,
+}
+
 /// One signal of the process image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Signal {
@@ -57,6 +66,8 @@ pub struct Signal {
     pub range: Option<[f64; 2]>,
     /// In an [observer's table](SignalTable::observed), where the PLC has a `%I` that the image has behind the `%Q`.
     pub in_plc: Option<Address>,
+    /// The comment and the folder, in a box because the tick has no use for them.
+    pub notes: Option<Box<Notes>>,
 }
 
 impl Signal {
@@ -80,7 +91,18 @@ impl Signal {
             dead_band: 0.0,
             range: None,
             in_plc: None,
+            notes: None,
         }
+    }
+
+    /// The comment; empty without one.
+    pub fn comment(&self) -> &str {
+        self.notes.as_ref().map_or("", |notes| &notes.comment)
+    }
+
+    /// The folder; empty without one.
+    pub fn folder(&self) -> &str {
+        self.notes.as_ref().map_or("", |notes| &notes.folder)
     }
 
     /// True if the slot holds a 64-bit integer and not a double: an unscaled LWORD, LINT or ULINT.

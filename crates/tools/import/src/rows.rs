@@ -61,7 +61,6 @@ pub(super) struct Tag {
     /// Two raw values, and the corresponding scaled values.
     pub(super) scale: Option<[f64; 4]>,
     pub(super) comment: String,
-    /// The tag table, list or program that has the tag.
     pub(super) folder: String,
 }
 

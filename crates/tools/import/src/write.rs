@@ -6,8 +6,7 @@ use std::path::Path;
 use super::device::Client;
 use super::rows::{Tag, World};
 use tickbus_base::toml_text::is_unprintable;
-use tickbus_image::signal::section::NOTE_LIMIT;
-use tickbus_image::signal::{Address, Addressing, ByteOrder, Width};
+use tickbus_image::signal::{Address, Addressing, ByteOrder, NOTE_LIMIT, Width};
 
 /// The text of a driver.cfg with these tags.
 pub(super) fn driver_cfg(file: &Path, tags: &[Tag], world: World) -> String {

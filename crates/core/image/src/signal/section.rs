@@ -1,9 +1,7 @@
 //! The `[[signal]]` sections of a driver.cfg: the same on every bus.
 
 use super::plan::rounded as rounded_by_codec;
-use super::{
-    Address, Addressing, Area, ByteOrder, DataType, Latch, Notes, Scale, Signal, Slot, Width,
-};
+use super::{Address, Addressing, Area, ByteOrder, DataType, Latch, Scale, Signal, Slot, Width};
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Key, Shape, Table, Value, did_you_mean, names, short_number, shown};
 
@@ -12,9 +10,6 @@ pub const NAME_LIMIT: usize = 120;
 
 /// The longest unit, in characters.
 const UNIT_LIMIT: usize = 40;
-
-/// The longest comment and the longest folder, in characters.
-pub const NOTE_LIMIT: usize = 200;
 
 /// The remedy where a station should be named.
 pub const STATION: &str = "write the name of a [[station]] in quotes";
@@ -103,16 +98,8 @@ pub const KEYS: &[Key] = &[
     ),
     DEAD_BAND_KEY,
     STATION_KEY,
-    Key::new(
-        "comment",
-        Shape::Label(NOTE_LIMIT),
-        "A comment for people, such as that of the PLC's tag list",
-    ),
-    Key::new(
-        "folder",
-        Shape::Label(NOTE_LIMIT),
-        "The tag table, list or program of the PLC's project that has the signal, for people",
-    ),
+    super::notes::COMMENT,
+    super::notes::FOLDER,
 ];
 
 const TYPES: [&str; DataType::ALL.len()] = {
@@ -215,8 +202,7 @@ pub fn read(mut table: Table<'_>, addressing: Addressing) -> Option<Section<'_>>
     let fail_safe = table.take("fail_safe");
     let dead_band = table.take("dead_band");
     let station = table.take("station");
-    let comment = table.take("comment");
-    let folder = table.take("folder");
+    let notes = super::notes::take(&mut table);
     let whole = table.is_whole();
     table.finish();
 
@@ -227,7 +213,6 @@ pub fn read(mut table: Table<'_>, addressing: Addressing) -> Option<Section<'_>>
     let stated = type_.as_ref().map(type_of);
     let unit =
         unit.and_then(|unit| unit.label(UNIT_LIMIT, "leave it out if the signal has no unit"));
-    let notes = notes_of(comment.as_ref(), folder.as_ref());
     let latched = latch.as_ref().map(latch_of);
     let held = hold.as_ref().map(Value::duration);
     let ordered = order.as_ref().map(order_of);
@@ -322,18 +307,6 @@ fn check_shapes(
     if let Some(station) = station {
         station.text(STATION);
     }
-}
-
-fn notes_of(comment: Option<&Value<'_>>, folder: Option<&Value<'_>>) -> Option<Box<Notes>> {
-    let read = |value: Option<&Value<'_>>, right| {
-        let text = value.and_then(|value| value.label(NOTE_LIMIT, right));
-        text.unwrap_or_default().to_owned()
-    };
-    let notes = Notes {
-        comment: read(comment, "leave it out if the signal has no comment"),
-        folder: read(folder, "leave it out if the signal is in no folder"),
-    };
-    (notes != Notes::default()).then(|| Box::new(notes))
 }
 
 /// A name: printable characters, not reserved for tickbus.

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::{Address, Area, ByteOrder, DataType, Scale, Slot};
+use super::{Address, Area, ByteOrder, DataType, Notes, Scale, Slot};
 use tickbus_base::time::Nanos;
 
 /// Which edges of a BOOL signal must not be lost between two exchanges.
@@ -14,15 +14,6 @@ pub enum Latch {
     Falling,
     /// Both.
     Both,
-}
-
-/// Texts about a signal, for people; each may be empty.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Notes {
-    /// The comment, as in the PLC's project.
-    pub comment: String,
-    /// The tag table, list or program of the PLC's project that has the signal.
-    pub folder: String,
 }
 
 /// One signal of the process image.

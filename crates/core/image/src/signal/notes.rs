@@ -30,14 +30,15 @@ pub struct Notes {
 
 /// Takes both keys out of a section; `None` if it has neither.
 pub(super) fn take(table: &mut Table<'_>) -> Option<Box<Notes>> {
-    let mut read = |key, right| {
+    const RIGHT: &str = "write a text in quotes, or leave the key out";
+    let mut read = |key| {
         let value = table.take(key);
-        let text = value.and_then(|value| value.label(NOTE_LIMIT, right));
+        let text = value.and_then(|value| value.label(NOTE_LIMIT, RIGHT));
         text.unwrap_or_default().to_owned()
     };
     let notes = Notes {
-        comment: read("comment", "leave it out if the signal has no comment"),
-        folder: read("folder", "leave it out if the signal is in no folder"),
+        comment: read("comment"),
+        folder: read("folder"),
     };
     (notes != Notes::default()).then(|| Box::new(notes))
 }

@@ -159,6 +159,7 @@ fn offset(text: &str, at: roxmltree::TextPos) -> usize {
 
 /// Variables with an `address`, in lists of global variables and in programs.
 fn plcopen(root: Node<'_, '_>, skipped: &Collector<'_>) -> Vec<Record> {
+    const SCOPES: [&str; 2] = ["pou", "globalVars"];
     let (mut records, mut without) = (Vec::new(), Vec::new());
     let mut names = Names::default();
     for variable in named(root, "variable") {
@@ -177,7 +178,6 @@ fn plcopen(root: Node<'_, '_>, skipped: &Collector<'_>) -> Vec<Record> {
         let at = place(variable, "address");
         let kind_at = kind.map_or(at, |kind| kind.range().start);
         let name = variable.attribute("name").unwrap_or_default();
-        const SCOPES: [&str; 2] = ["pou", "globalVars"];
         let name = &names.give(variable, name, &SCOPES, "name");
         let comment = words(child(variable, "documentation"));
         let record = record(variable, name, (address, at), (called, kind_at), &comment);

@@ -361,7 +361,7 @@ fn structured_text_with_a_configuration_is_openplcs() {
     let text = format!("{text}\nCONFIGURATION c\nEND_CONFIGURATION\n");
     let imported = read("main.st", &text);
     assert_eq!(lines(&imported), ["level %IW200 INT", "door %IX0.0 BOOL"]);
-    assert!(imported.text.contains("# closed"), "{}", imported.text);
+    assert_eq!(notes(&imported), ["door: closed []"]);
     // A hosted program takes the unit of the driver.cfg, so its addresses are those of the signals.
     for kept in ["\naddressing = \"iec\" ", "\"%IW100\""] {
         assert!(imported.text.contains(kept), "{}", imported.text);

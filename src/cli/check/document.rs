@@ -166,6 +166,8 @@ fn row(
         "hold_ns": (signal.hold != Nanos::ZERO).then_some(signal.hold.0),
         "scale": signal.scale.map(|scale| json!({ "gain": scale.gain, "offset": scale.offset })),
         "unit": signal.unit,
+        "comment": some(signal.comment().to_owned()),
+        "folder": some(signal.folder().to_owned()),
         "dead_band": (signal.dead_band != 0.0).then_some(signal.dead_band),
         "fail_safe": fail_safe(signal),
     })

@@ -69,7 +69,7 @@ pub(super) fn report(config: &Config, writers: &Writers) -> Result<String, Mista
     }
     let points = signals.iter().enumerate().map(|(index, signal)| Point {
         name: &signal.name,
-        comment: "",
+        comment: signal.comment(),
         is_input: signal.area == Area::Input,
         is_bool: signal.data_type == DataType::Bool,
         is_written: written.contains(&index),

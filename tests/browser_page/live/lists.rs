@@ -159,6 +159,91 @@ fn a_list_is_made_by_hand_saved_beside_the_driver_and_shared_by_its_link() {
 }
 
 #[test]
+fn a_comment_is_shown_and_found_and_signals_are_grouped_by_folder() {
+    let screenshots = crate::screenshots();
+    let commented = TANK
+        .replacen(
+            "latch =",
+            "comment = \"Inlet valve Y17, beside the pump\"\nfolder = \"Outputs\"\nlatch =",
+            1,
+        )
+        .replacen(
+            "\"%IW2\"",
+            "\"%IW2\"\ncomment = \"Radar in the lid\"\nfolder = \"Inputs\"",
+            1,
+        );
+    let machine = Machine::new("modbus-server", "", &commented);
+    let browser = open(&machine, 1440, 900);
+    browser.wait("watch.files.size === 1");
+    assert_eq!(
+        browser.run("return document.getElementById('watch-folder').hidden"),
+        false
+    );
+    set(&browser, "watch-group", "folder");
+    let right = json!([
+        "Outputs: 1",
+        "Valve",
+        "Inputs: 1",
+        "Level",
+        "No folder: 2",
+        "Level low",
+        "Set point",
+    ]);
+    assert_eq!(rows(&browser), right);
+    // The row that has no comment has no element for one.
+    let comments = "return Array.from(document.querySelectorAll('#window .comment')).map((it) => [it.textContent, it.clientWidth > 80])";
+    assert_eq!(
+        browser.run(comments),
+        json!([
+            ["Inlet valve Y17, beside the pump", true],
+            ["Radar in the lid", true]
+        ])
+    );
+    let title = format!("return {}.title", row("Level"));
+    assert_eq!(browser.run(&title), "Level, INT at %IW2: Radar in the lid");
+    choose(&browser, "Level");
+    browser.wait(
+        "document.getElementById('chosen-facts').textContent.startsWith('Radar in the lid · %IW2')",
+    );
+    shoot(&browser, screenshots.as_deref(), "live-comments", false);
+    // A word of a comment is found; the row that had one before, and is used again, shows none.
+    let filter = |words: &str| {
+        browser.run(&format!(
+            "const it = document.getElementById('filter'); it.value = {}; it.dispatchEvent(new Event('input'))",
+            json!(words)
+        ));
+    };
+    filter("RADAR");
+    assert_eq!(rows(&browser), json!(["Inputs: 1", "Level"]));
+    filter("set point");
+    assert_eq!(rows(&browser), json!(["No folder: 1", "Set point"]));
+    let left = format!(
+        "return {}.parts.comment?.textContent ?? ''",
+        row("Set point")
+    );
+    assert_eq!(browser.run(&left), "");
+    filter("");
+    browser.run("document.getElementById('watch-new').focus()");
+    browser.keys(&format!("by folder{ENTER}"));
+    wait_said(
+        &browser,
+        "The list \"by folder\" is saved in tank.lists.toml.",
+    );
+    let text = fs::read_to_string(machine.folder.path().join("tank.lists.toml"));
+    assert!(text.expect("the file").contains("group = \"folder\""));
+    assert_quiet(&browser);
+    let phone = Browser::start(390, 844);
+    phone.go(&machine.url);
+    phone.wait("document.querySelectorAll('#window .comment').length === 2");
+    assert_fits(&phone);
+    shoot(&phone, screenshots.as_deref(), "live-comments-phone", false);
+    assert_eq!(
+        phone.run("return getComputedStyle(document.querySelector('#window .comment')).display"),
+        "none"
+    );
+}
+
+#[test]
 fn a_file_that_somebody_edits_is_shown_and_not_overwritten() {
     let list = "[[list]]\nname = \"a\"\npins = [\"Level\", \"Levle\"]   # to be mended\n";
     let machine = Machine::with("modbus-server", "", TANK, &[("tank.lists.toml", list)]);

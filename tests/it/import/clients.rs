@@ -90,7 +90,7 @@ fn an_export_of_kepserver_keeps_types_units_scales_and_who_may_write() {
         "\"Tank.Level\" = \"400021\"",
         "scale   = { raw = [0.0, 27648.0], value = [0.0, 100.0] }",
         "unit    = \"l\"",
-        "   # in the tank",
+        "comment = \"in the tank\"",
     ] {
         assert!(imported.text.contains(line), "{line}\n{}", imported.text);
     }

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use tickbus::import::{Client, ImportOptions, Imported, condensed, import};
 use tickbus_image::signal::Addressing;
 
-use crate::import::signals;
+use crate::import::{notes, signals};
 
 fn read_as(file: &str, text: &str, reading: ImportOptions) -> Result<Imported, String> {
     import(file, text.as_bytes(), reading, &tickbus::KINDS).map_err(|mistakes| mistakes.to_string())
@@ -65,10 +65,12 @@ fn the_data_of_modules_are_signals_and_commented_bits_are_bits() {
             "Local:2:O.Ch0.Data %QD0 REAL",
         ]
     );
-    assert!(
-        imported.text.contains("\"%IX4.0\"   # door closed"),
-        "{}",
-        imported.text
+    assert_eq!(
+        notes(&imported),
+        [
+            "Local:1:I.Data.3: door closed []",
+            "Local:1:I.Data.10: lid []"
+        ]
     );
     assert_eq!((imported.signals, imported.assigned), (6, 6));
 }
@@ -116,7 +118,7 @@ fn a_module_in_a_remote_rack_is_a_part_of_its_adapters_data() {
             "Rack:I.Slot[1].Data.5 %IX4.1 BOOL"
         ]
     );
-    assert!(imported.text.contains("# lid"), "{}", imported.text);
+    assert_eq!(notes(&imported), ["Rack:I.Slot[1].Data.5: lid []"]);
 }
 
 #[test]
@@ -155,7 +157,14 @@ fn the_tag_table_of_studio_5000_gives_aliases_and_commented_points() {
             "Local:1:I.Data.4 %IX0.1 BOOL"
         ]
     );
-    assert!(imported.text.contains("# lid open"), "{}", imported.text);
+    assert_eq!(
+        notes(&imported),
+        [
+            "Door: closed []",
+            "Main.Lamp:  [Main]",
+            "Local:1:I.Data.4: lid open []"
+        ]
+    );
     let skipped = &imported.skipped[0].mistake;
     assert!(
         skipped.what.contains("\"Drive:I\"") && skipped.right.contains("L5X"),
@@ -187,10 +196,13 @@ fn a_program_without_its_modules_gives_the_points_whose_type_its_tags_tell() {
             "Card.DATA.7 %IX8.2 BOOL",
         ]
     );
-    assert!(
-        imported.text.contains("CH01.DATA level"),
-        "{}",
-        imported.text
+    assert_eq!(
+        notes(&imported),
+        [
+            "Card.PT00.DATA: lid []",
+            "Card.CH01.DATA: level []",
+            "Card.DATA.7: door []"
+        ]
     );
     let skipped: Vec<&str> = imported
         .skipped
@@ -224,7 +236,10 @@ fn the_table_of_studio_5000_tells_types_by_radix_and_by_comments_on_members_of_a
             "Card.CH01.DATA %ID0 REAL"
         ]
     );
-    assert!(imported.text.contains("PT00.DATA lid"), "{}", imported.text);
+    assert_eq!(
+        notes(&imported),
+        ["Card.PT00.DATA: lid []", "Card.CH01.DATA: level []"]
+    );
     let skipped: Vec<&str> = imported
         .skipped
         .iter()
@@ -258,10 +273,12 @@ fn variables_of_twincat_without_a_place_get_one_in_order_behind_the_others() {
     );
     assert_eq!(imported.assigned, 4);
     assert!(
-        imported.text.contains("# %I* the button"),
+        imported.text.contains("address = \"%IX10.0\"   # %I*\n"),
         "{}",
         imported.text
     );
+    assert_eq!(notes(&imported)[0], "start: the button [IO]");
+    assert_eq!(notes(&imported)[3], "lamps[2]:  [IO]");
     assert!(
         imported.notes[0].contains("4 inputs and outputs have no place"),
         "{:?}",
@@ -344,7 +361,7 @@ fn structured_text_with_a_configuration_is_openplcs() {
     let text = format!("{text}\nCONFIGURATION c\nEND_CONFIGURATION\n");
     let imported = read("main.st", &text);
     assert_eq!(lines(&imported), ["level %IW200 INT", "door %IX0.0 BOOL"]);
-    assert!(imported.text.contains("# closed"), "{}", imported.text);
+    assert_eq!(notes(&imported), ["door: closed []"]);
     // A hosted program takes the unit of the driver.cfg, so its addresses are those of the signals.
     for kept in ["\naddressing = \"iec\" ", "\"%IW100\""] {
         assert!(imported.text.contains(kept), "{}", imported.text);
@@ -362,15 +379,22 @@ fn the_tag_tables_of_tia_portal_as_xml_are_read() {
         lines(&imported),
         ["Start %IX0.0 BOOL", "Speed & way %QD4 REAL"]
     );
-    assert!(imported.text.contains("# the button"), "{}", imported.text);
+    assert_eq!(
+        notes(&imported),
+        [
+            "Start: the button [Default tag table]",
+            "Speed & way:  [Default tag table]"
+        ]
+    );
     assert_eq!(imported.skipped.len(), 1);
-    let openness = "<Document><SW.Tags.PlcTagTable><ObjectList><SW.Tags.PlcTag><AttributeList><DataTypeName>Bool</DataTypeName>\
+    let openness = "<Document><SW.Tags.PlcTagTable>\
+                    <AttributeList><Name>Lamps</Name></AttributeList><ObjectList><SW.Tags.PlcTag><AttributeList><DataTypeName>Bool</DataTypeName>\
                     <LogicalAddress>%Q0.1</LogicalAddress><Name>Lamp</Name></AttributeList><ObjectList><MultilingualText>\
                     <ObjectList><MultilingualTextItem><AttributeList><Text>green</Text></AttributeList></MultilingualTextItem>\
                     </ObjectList></MultilingualText></ObjectList></SW.Tags.PlcTag></ObjectList></SW.Tags.PlcTagTable></Document>";
     let imported = read("tags.xml", openness);
     assert_eq!(lines(&imported), ["Lamp %QX0.1 BOOL"]);
-    assert!(imported.text.contains("# green"), "{}", imported.text);
+    assert_eq!(notes(&imported), ["Lamp: green [Lamps]"]);
 }
 
 #[test]
@@ -399,6 +423,13 @@ fn the_mapping_export_of_codesys_counts_elements_and_leaves_free_channels_out() 
         [
             "Application.IO.Door %IX2.0 BOOL",
             "Application.IO.Level %IW4 WORD"
+        ]
+    );
+    assert_eq!(
+        notes(&imported),
+        [
+            "Application.IO.Door: closed [Application.IO]",
+            "Application.IO.Level:  [Application.IO]"
         ]
     );
     assert_eq!(imported.skipped.len(), 1);

@@ -60,6 +60,17 @@ fn signals(imported: &Imported) -> Vec<(String, String, String)> {
         .collect()
 }
 
+/// Comment and folder of each signal that has either: `Start: the button [Default tag table]`.
+fn notes(imported: &Imported) -> Vec<String> {
+    let config = Config::parse("driver.cfg", &imported.text, &tickbus::KINDS)
+        .unwrap_or_else(|m| panic!("{m}\n{}", imported.text));
+    let signals = config.table.signals.iter();
+    let noted = signals.filter(|signal| signal.notes.is_some());
+    noted
+        .map(|it| format!("{}: {} [{}]", it.name, it.comment(), it.folder()))
+        .collect()
+}
+
 fn told(text: &str) -> String {
     import(
         "tags.csv",
@@ -95,16 +106,40 @@ fn columns_are_found_by_their_headings_or_by_what_stands_in_them() {
     ] {
         let imported = read(text);
         assert_eq!(signals(&imported), expected, "{text}");
-        if text.contains("button") {
-            assert!(
-                imported
-                    .text
-                    .contains("address = \"%IX0.0\"   # the button\n"),
-                "{}",
-                imported.text
-            );
+        let folder = if text.contains("Path") {
+            "Default tag table"
+        } else {
+            ""
+        };
+        let mut expected = vec![
+            format!("Start: the button [{folder}]"),
+            format!("Speed:  [{folder}]"),
+            format!("Level: in mm [{folder}]"),
+        ];
+        if folder.is_empty() {
+            expected.remove(1);
         }
+        if !text.contains("button") {
+            expected.clear();
+        }
+        expected.retain(|line| !line.starts_with("Level") || text.contains("in mm"));
+        assert_eq!(notes(&imported), expected, "{text}");
     }
+}
+
+#[test]
+fn a_comment_is_one_printable_line_and_at_most_as_long_as_the_key() {
+    let long = "x".repeat(250);
+    let imported = read(&format!(
+        "name;address;type;comment\nA;%I0.0;Bool;\"two\nlines \u{202e}\"\"quoted\"\" C:\\\"\nB;%I0.1;Bool;{long}\nC;%I0.2;Bool;\u{7}\n"
+    ));
+    assert_eq!(
+        notes(&imported),
+        [
+            "A: two lines \"quoted\" C:\\ []".to_owned(),
+            format!("B: {} []", &long[..200])
+        ]
+    );
 }
 
 #[test]
@@ -272,6 +307,12 @@ fn assert_same_of(config: &Config, target: Target) {
         &tickbus::KINDS,
     )
     .unwrap_or_else(|mistakes| panic!("{mistakes}\n{}", tags.text));
+    let commented = config.table.signals.iter();
+    let commented = commented.filter(|signal| !signal.comment().is_empty());
+    for signal in commented {
+        let line = format!("{}: {} []", signal.name, signal.comment());
+        assert!(notes(&imported).contains(&line), "{line}\n{}", tags.text);
+    }
     let mut read = signals(&imported);
     let mut expected: Vec<_> = config
         .table
@@ -298,7 +339,7 @@ proptest! {
             let name: String = name.split_whitespace().collect::<Vec<_>>().join(" ");
             let name = name.replace('\\', "\\\\").replace('"', "\\\"");
             let kind = ["REAL", "DINT", "DWORD"][number % 3];
-            write!(sections, "[[signal]]\nname = \"{name}|{number}\"\naddress = \"%QD{}\"\ntype = \"{kind}\"\n", 4 * number).expect("a String takes all");
+            write!(sections, "[[signal]]\nname = \"{name}|{number}\"\naddress = \"%QD{}\"\ntype = \"{kind}\"\ncomment = \"{name}\"\n", 4 * number).expect("a String takes all");
         }
         let text = format!("[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"socket\"\n{sections}");
         if let Ok(config) = Config::parse("driver.cfg", &text, &tickbus::KINDS) {

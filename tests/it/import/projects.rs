@@ -2,7 +2,7 @@
 
 use tickbus::import::{ImportOptions, Imported, import};
 
-use crate::import::signals;
+use crate::import::{notes, signals};
 
 fn read(file: &str, text: &str) -> Imported {
     import(
@@ -66,12 +66,9 @@ fn variables_of_plcopen_xml_with_an_address_become_signals_and_the_others_are_to
         imported.text
     );
     assert_eq!(imported.assigned, 1);
-    assert!(
-        imported
-            .text
-            .contains("\"%IX0.0\"   # the green & big button"),
-        "{}",
-        imported.text
+    assert_eq!(
+        notes(&imported)[..2],
+        ["Start: the green & big button [IO]", "Level:  [IO]"]
     );
     let skipped: Vec<String> = imported
         .skipped
@@ -137,12 +134,11 @@ fn aliases_of_module_points_in_l5x_become_signals_laid_out_without_gaps() {
         ]
     );
     assert!(
-        imported
-            .text
-            .contains("   # Local:1:I.Data.0 the green button"),
+        imported.text.contains("   # Local:1:I.Data.0\n"),
         "{}",
         imported.text
     );
+    assert_eq!(notes(&imported), ["Start_PB: the green button []"]);
     let skipped: Vec<&str> = imported
         .skipped
         .iter()
@@ -205,7 +201,12 @@ fn local_variables_of_one_name_get_that_of_their_program_in_front() {
         program("Left", 0),
         program("Right", 1)
     );
-    assert_eq!(names(&read("cell.L5X", &text)), ["Start", "Right.Start"]);
+    let imported = read("cell.L5X", &text);
+    assert_eq!(names(&imported), ["Start", "Right.Start"]);
+    assert_eq!(
+        notes(&imported),
+        ["Start:  [Left]", "Right.Start:  [Right]"]
+    );
 }
 
 #[test]

@@ -7,7 +7,7 @@ use tickbus::import::{ImportOptions, Imported, import};
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
-use crate::import::signals;
+use crate::import::{notes, signals};
 
 /// A zip archive of these parts.
 fn zipped(parts: &[(&str, &[u8])]) -> Vec<u8> {
@@ -163,10 +163,13 @@ fn the_workbook_of_tia_portal_is_read_and_its_other_sheets_are_told() {
         names,
         ["Start %IX0.0 BOOL", "Speed %QD4 REAL", "Ticks %IL8 LINT"]
     );
-    assert!(
-        imported.text.contains("   # the button"),
-        "{}",
-        imported.text
+    assert_eq!(
+        notes(&imported),
+        [
+            "Start: the button [Default tag table]",
+            "Speed:  [Default tag table]",
+            "Ticks:  [Default tag table]"
+        ]
     );
     let skipped: Vec<&str> = imported
         .skipped

@@ -379,6 +379,7 @@ fn signal(axis: &Axis, field: Field, scales: Scales, band: Option<f64>) -> Signa
         dead_band: band.filter(|_| feedback).unwrap_or_default(),
         range: None,
         in_plc: None,
+        notes: None,
     }
 }
 

@@ -561,6 +561,15 @@ mod tests {
     }
 
     #[test]
+    fn a_comment_and_a_folder_are_kept_and_a_signal_without_them_has_no_notes() {
+        let longest = "é".repeat(200);
+        let keys = format!("address = \"%QX0.0\"\ncomment = \"{longest}\"\nfolder = \"IO # 1\"");
+        let noted = signal(&keys);
+        assert_eq!((noted.comment(), noted.folder()), (&*longest, "IO # 1"));
+        assert_eq!(signal("address = \"%QX0.0\"").notes, None);
+    }
+
+    #[test]
     fn fail_safe_values_are_exact_and_of_the_slot_s_own_kind() {
         for (keys, slot) in [
             (

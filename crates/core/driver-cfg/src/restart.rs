@@ -177,6 +177,7 @@ fn difference(old: &Signal, new: &Signal) -> Option<impl Display> {
         (old.order != new.order, "byte order"),
         (old.scale != new.scale || old.range != new.range, "scale"),
         (old.unit != new.unit, "unit"),
+        (old.notes != new.notes, "comment or folder"),
         (
             old.latch != new.latch || old.hold != new.hold,
             "latch or hold",
@@ -238,6 +239,11 @@ mod tests {
                 "\"Lamp\"",
                 "\"Light\"",
                 "signal 1 \"Lamp\" has another name",
+            ),
+            (
+                "\"%QW0\"\n",
+                "\"%QW0\"\ncomment = \"main\"\n",
+                "signal 2 \"Valve\" has another comment or folder",
             ),
             (
                 "\"%QW0\"\n",

@@ -29,8 +29,12 @@ pub(super) fn file(config: &Config) -> File {
     File { name, text }
 }
 
-/// Direction, station, unit and scale of a signal.
+/// The comment of a signal, or its direction, station, unit and scale if it has none.
 pub(super) fn comment(place: &PlacedSignal<'_>, area: Area) -> String {
+    // Alone, so that the comment stays the same when a PLC tool reads the list and tickbus reads that tool's list.
+    if !place.signal.comment().is_empty() {
+        return place.signal.comment().to_owned();
+    }
     let mut parts = vec![
         match area {
             Area::Input => "simulation to PLC",

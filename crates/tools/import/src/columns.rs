@@ -13,6 +13,7 @@ pub(super) struct Columns {
     pub(super) address: usize,
     pub(super) kind: Option<usize>,
     pub(super) comment: Option<usize>,
+    pub(super) folder: Option<usize>,
     pub(super) unit: Option<usize>,
     pub(super) order: Option<usize>,
     /// The direction column: direction, or KEPServer's client access.
@@ -23,13 +24,14 @@ pub(super) struct Columns {
 }
 
 impl Columns {
-    /// Name, address, type, comment, without headings.
+    /// Name, address, type, comment, folder, without headings.
     pub(super) fn fixed() -> Self {
         Self {
             name: 0,
             address: 1,
             kind: Some(2),
             comment: Some(3),
+            folder: Some(4),
             unit: None,
             order: None,
             direction: None,
@@ -67,6 +69,8 @@ const COMMENTS: &[&str] = &[
     "beschreibung",
     "bemerkung",
 ];
+/// TIA Portal calls the tag table and its groups a path.
+const FOLDERS: &[&str] = &["path", "pfad", "folder", "ordner"];
 const UNITS: &[&str] = &["unit", "einheit", "eng units", "eng. units"];
 const DIRECTIONS: &[&str] = &["direction", "richtung", "client access"];
 const SCALES: [&str; 5] = [
@@ -78,7 +82,8 @@ const SCALES: [&str; 5] = [
 ];
 const ORDERS: &[&str] = &["order", "byte order"];
 
-/// The variables that CODESYS maps to channels, by its `//CoDeSys Mapping Export`: name, address, type, comment. `None`
+/// The variables that CODESYS maps to channels, by its `//CoDeSys Mapping Export`: name, address, type, comment, folder.
+/// `None`
 /// for any other table. Channels without a variable are reported to `skipped`.
 pub(super) fn codesys_mapping(records: &[Record], skipped: &Collector<'_>) -> Option<Vec<Record>> {
     let head = records.first()?.first()?;
@@ -111,9 +116,19 @@ pub(super) fn codesys_mapping(records: &[Record], skipped: &Collector<'_>) -> Op
             record[4].clone(),
             kind,
             record[3].clone(),
+            folder_of(&record[0]),
         ]
     });
     Some(mapped.collect())
+}
+
+/// The list or program of a mapped variable, `Application.IO` of `Application.IO.Door`.
+fn folder_of(variable: &Cell) -> Cell {
+    let folder = variable.text.rsplit_once('.');
+    Cell {
+        text: folder.map_or_else(String::new, |(folder, _)| folder.to_owned()),
+        at: variable.at,
+    }
 }
 
 /// The number of records examined if there are no headings.
@@ -132,6 +147,7 @@ pub(super) fn find(records: &[Record]) -> Option<Columns> {
             address,
             kind: called(TYPES),
             comment: called(COMMENTS),
+            folder: called(FOLDERS),
             unit: called(UNITS),
             order: called(ORDERS),
             direction: called(DIRECTIONS),
@@ -175,6 +191,7 @@ pub(super) fn find(records: &[Record]) -> Option<Columns> {
         address,
         kind: (address + 1 < width).then_some(address + 1),
         comment,
+        folder: None,
         ..Columns::fixed()
     })
 }

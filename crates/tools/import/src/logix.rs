@@ -14,7 +14,7 @@ use roxmltree::Node;
 use super::cells::{Cell, Record};
 use super::device;
 use super::rows::MOST;
-use super::xml::{Names, child, named, place, record, words};
+use super::xml::{Names, child, in_folder, named, place, record, scope, words};
 use tickbus_base::toml_text::{Collector, shown};
 
 /// A value in a module's data.
@@ -254,6 +254,7 @@ fn aliases(root: Node<'_, '_>, points: &mut Points, skipped: &Collector<'_>) -> 
             continue;
         }
         let at = place(tag, "AliasFor");
+        let program = scope(tag, &["Program"], "Name");
         let path = points.resolved(target);
         let known = points.by_path.get(&path).copied();
         let within = if known.is_none() && records.len() < MOST {
@@ -267,10 +268,11 @@ fn aliases(root: Node<'_, '_>, points: &mut Points, skipped: &Collector<'_>) -> 
                 let point = &mut points.list[index];
                 point.is_named = true;
                 let name = format!("{name}{}", &point.path[path.len()..]);
-                records.push(cells(
+                let record = cells(
                     [&name, &point.path, &point.kind, ""],
                     [place(tag, "Name"), at, at, at],
-                ));
+                );
+                records.push(in_folder(record, program));
             }
             continue;
         }
@@ -304,10 +306,11 @@ fn aliases(root: Node<'_, '_>, points: &mut Points, skipped: &Collector<'_>) -> 
                 let is_new = members.insert(member.to_ascii_uppercase());
                 is_new.then(|| {
                     let texts = [&name, target].map(|whole| format!("{whole}{member}"));
-                    cells(
+                    let record = cells(
                         [&texts[0], &texts[1], kind, &words(Some(comment))],
                         [place(comment, "Operand"), at, at, at],
-                    )
+                    );
+                    in_folder(record, program)
                 })
             }));
             unknown(skipped, at, target, records.len() > before, "file");
@@ -323,7 +326,7 @@ fn aliases(root: Node<'_, '_>, points: &mut Points, skipped: &Collector<'_>) -> 
             &comment,
         );
         record[0].at = place(tag, "Name");
-        records.push(record);
+        records.push(in_folder(record, program));
     }
     if let Some(first) = others.first() {
         skipped.report(

@@ -6,7 +6,7 @@ use roxmltree::{Document, Node, ParsingOptions};
 use super::Sheet;
 use super::cells::Record;
 use super::columns::Columns;
-use super::xml::{Names, child, named, place, record, words};
+use super::xml::{Names, child, in_folder, named, place, record, scope, words};
 use super::{declarations, logix};
 use tickbus_base::toml_text::{Collector, Mistakes};
 
@@ -98,7 +98,9 @@ fn twincat(root: Node<'_, '_>, text: &str) -> Vec<Record> {
         let range = node.range();
         // The text as in the file, so that its positions are those of the file.
         let from = range.start + text[range.clone()].find("<![CDATA[")?;
-        Some(declarations::read(text, from, range.end))
+        let records = declarations::read(text, from, range.end);
+        let folder = node.parent().and_then(|parent| parent.attribute("Name"));
+        Some(records.into_iter().map(move |it| in_folder(it, folder)))
     });
     declarations.flatten().collect()
 }
@@ -107,13 +109,14 @@ fn twincat(root: Node<'_, '_>, text: &str) -> Vec<Record> {
 fn tag_table(root: Node<'_, '_>) -> Vec<Record> {
     let tags = named(root, "Tag").map(|tag| {
         let attribute = |name: &str| tag.attribute(name).unwrap_or_default();
-        record(
+        let record = record(
             tag,
             &words(Some(tag)),
             (attribute("addr"), place(tag, "addr")),
             (attribute("type"), place(tag, "type")),
             attribute("remark"),
-        )
+        );
+        in_folder(record, scope(tag, &["Tagtable"], "name"))
     });
     tags.collect()
 }
@@ -121,6 +124,9 @@ fn tag_table(root: Node<'_, '_>) -> Vec<Record> {
 /// The tags of a table exported by TIA Portal Openness.
 fn openness(root: Node<'_, '_>) -> Vec<Record> {
     let tags = named(root, "SW.Tags.PlcTag").filter_map(|tag| {
+        let mut around = tag.ancestors();
+        let table = around.find(|node| node.tag_name().name() == "SW.Tags.PlcTagTable");
+        let table = table.and_then(|table| child(child(table, "AttributeList")?, "Name"));
         let attributes = child(tag, "AttributeList")?;
         let attribute = |name: &str| {
             let node = child(attributes, name);
@@ -128,13 +134,14 @@ fn openness(root: Node<'_, '_>) -> Vec<Record> {
         };
         let (address, kind) = (attribute("LogicalAddress"), attribute("DataTypeName"));
         let comment = words(named(tag, "Text").next());
-        Some(record(
+        let record = record(
             tag,
             &attribute("Name").0,
             (&address.0, address.1),
             (&kind.0, kind.1),
             &comment,
-        ))
+        );
+        Some(in_folder(record, Some(&words(table))))
     });
     tags.collect()
 }
@@ -152,6 +159,7 @@ fn offset(text: &str, at: roxmltree::TextPos) -> usize {
 
 /// Variables with an `address`, in lists of global variables and in programs.
 fn plcopen(root: Node<'_, '_>, skipped: &Collector<'_>) -> Vec<Record> {
+    const SCOPES: [&str; 2] = ["pou", "globalVars"];
     let (mut records, mut without) = (Vec::new(), Vec::new());
     let mut names = Names::default();
     for variable in named(root, "variable") {
@@ -170,15 +178,10 @@ fn plcopen(root: Node<'_, '_>, skipped: &Collector<'_>) -> Vec<Record> {
         let at = place(variable, "address");
         let kind_at = kind.map_or(at, |kind| kind.range().start);
         let name = variable.attribute("name").unwrap_or_default();
-        let name = &names.give(variable, name, &["pou", "globalVars"], "name");
+        let name = &names.give(variable, name, &SCOPES, "name");
         let comment = words(child(variable, "documentation"));
-        records.push(record(
-            variable,
-            name,
-            (address, at),
-            (called, kind_at),
-            &comment,
-        ));
+        let record = record(variable, name, (address, at), (called, kind_at), &comment);
+        records.push(in_folder(record, scope(variable, &SCOPES, "name")));
     }
     if let Some(first) = without.first() {
         skipped.report(

@@ -61,6 +61,7 @@ pub(super) struct Tag {
     /// Two raw values, and the corresponding scaled values.
     pub(super) scale: Option<[f64; 4]>,
     pub(super) comment: String,
+    pub(super) folder: String,
 }
 
 /// The names and bits of the preceding tags.
@@ -224,6 +225,7 @@ impl Row<'_> {
             unit: (!unit.is_empty()).then(|| unit.to_owned()),
             scale,
             comment: self.text(columns.comment).to_owned(),
+            folder: self.text(columns.folder).to_owned(),
         })
     }
 

@@ -5,10 +5,8 @@ use std::path::Path;
 
 use super::device::Client;
 use super::rows::{Tag, World};
-use tickbus_image::signal::{Address, Addressing, ByteOrder, Width};
-
-/// The longest comment that is copied, in characters.
-const LONGEST_COMMENT: usize = 200;
+use tickbus_base::toml_text::is_unprintable;
+use tickbus_image::signal::{Address, Addressing, ByteOrder, NOTE_LIMIT, Width};
 
 /// The text of a driver.cfg with these tags.
 pub(super) fn driver_cfg(file: &Path, tags: &[Tag], world: World) -> String {
@@ -35,7 +33,7 @@ pub(super) fn driver_cfg(file: &Path, tags: &[Tag], world: World) -> String {
          id   = 1                       # a number that no other driver of the simulator has\n\
          name = {}\n{}\n\
          [fieldbus]\n{}",
-        comment(&source),
+        note(&source),
         remark(world),
         if matches!(world, World::Image(_)) && tags.iter().any(|tag| !tag.at.is_empty()) {
             ASSIGNED
@@ -146,13 +144,9 @@ fn signal(out: &mut String, tag: &Tag, world: World) {
     let Some(address) = tag.address else {
         return;
     };
-    let mut remark = comment(&tag.comment);
-    if !matches!(world, World::Device(_)) && !tag.at.is_empty() {
-        let place = if tag.at == tag.name { "" } else { &tag.at };
-        remark = comment(format!("{place} {remark}").trim_start());
-    }
-    if !remark.is_empty() {
-        remark.insert_str(0, "   # ");
+    let mut remark = String::new();
+    if !matches!(world, World::Device(_)) && !tag.at.is_empty() && tag.at != tag.name {
+        remark = format!("   # {}", note(&tag.at));
     }
     out.push_str("\n[[signal]]\n");
     let mut line = |key: &str, value: String| {
@@ -178,6 +172,12 @@ fn signal(out: &mut String, tag: &Tag, world: World) {
             format!("{{ raw = [{low:?}, {high:?}], value = [{from:?}, {to:?}] }}"),
         );
     }
+    for (key, words) in [("comment", &tag.comment), ("folder", &tag.folder)] {
+        let words = note(words);
+        if !words.is_empty() {
+            line(key, text(&words));
+        }
+    }
 }
 
 /// A text of TOML, in quotes.
@@ -185,13 +185,13 @@ pub(super) fn text(text: &str) -> String {
     format!("\"{}\"", text.replace('\\', "\\\\").replace('"', "\\\""))
 }
 
-/// A text that is safe in a comment.
-fn comment(text: &str) -> String {
-    let mut comment: String = text
+/// A text as the value of "comment" or "folder": one line, of printable characters, not too long.
+fn note(text: &str) -> String {
+    let printable: String = text
         .chars()
-        .filter(|c| !c.is_control())
-        .take(LONGEST_COMMENT)
+        .map(|c| if c.is_whitespace() { ' ' } else { c })
+        .filter(|c| !is_unprintable(*c))
         .collect();
-    comment.truncate(comment.trim_end().len());
-    comment
+    let note: String = printable.trim().chars().take(NOTE_LIMIT).collect();
+    note.trim_end().to_owned()
 }

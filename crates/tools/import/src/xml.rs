@@ -61,6 +61,25 @@ pub(super) fn record(
     ]
 }
 
+/// A record with the folder that its variable is in.
+pub(super) fn in_folder(mut record: Record, folder: Option<&str>) -> Record {
+    let text = folder.unwrap_or_default().to_owned();
+    let at = record[0].at;
+    record.push(Cell { text, at });
+    record
+}
+
+/// The attribute of the nearest of these `scopes` around a variable.
+pub(super) fn scope<'a>(
+    variable: Node<'a, '_>,
+    scopes: &[&str],
+    attribute: &str,
+) -> Option<&'a str> {
+    let mut around = variable.ancestors();
+    let scope = around.find(|node| scopes.contains(&node.tag_name().name()))?;
+    scope.attribute(attribute)
+}
+
 /// The names of variables so far.
 #[derive(Default)]
 pub(super) struct Names {
@@ -77,12 +96,10 @@ impl Names {
         attribute: &str,
     ) -> String {
         let mut wanted = name.to_owned();
-        if self.given.contains(name) {
-            let mut around = variable.ancestors();
-            let scope = around.find(|node| scopes.contains(&node.tag_name().name()));
-            if let Some(scope) = scope.and_then(|scope| scope.attribute(attribute)) {
-                wanted = format!("{scope}.{name}");
-            }
+        if self.given.contains(name)
+            && let Some(scope) = scope(variable, scopes, attribute)
+        {
+            wanted = format!("{scope}.{name}");
         }
         self.given.insert(wanted.clone());
         wanted

@@ -120,6 +120,13 @@ const list = (() => {
   }
 
   const text = (element, name, value) => set(element, name, value, (it) => { it.parts[name].textContent = value; });
+  /** Only a row that has had a comment has an element for it. To a screen reader the row's title describes the row. */
+  const note = (element, value) => set(element, "comment", value, ({ parts }) => {
+    if (!value && !parts.comment) return;
+    parts.comment ??= part("comment", "", parts.name.parentElement);
+    parts.comment.ariaHidden = "true";
+    parts.comment.textContent = value;
+  });
   const flag = (element, name, value) => set(element, name, value, (it) => it.classList.toggle(name, value));
 
   function part(name, role, parent, tag = "span") {
@@ -230,6 +237,7 @@ const list = (() => {
       const value = format.value(signal);
       const isOn = signal.isBool && plant.number(signal) > 0.5;
       text(element, "name", signal.name);
+      note(element, signal.comment);
       text(element, "address", signal.address);
       text(element, "number", value);
       text(element, "unit", signal.unit);
@@ -253,7 +261,7 @@ const list = (() => {
       flag(element, "new", plant.isNew(signal));
       set(element, "chosen", signal === chosen, (it, yes) => it.setAttribute("aria-selected", yes));
       set(element, "label", `Trend of ${signal.name}`, (it, label) => { it.parts.open.setAttribute("aria-label", label); it.parts.open.title = label; });
-      set(element, "title", `${signal.name}, ${signal.type}${signal.address && ` at ${signal.address}`}${signal.latch ? `, latch ${signal.latch}` : ""}${signal.reply ? `, reply: ${signal.reply}` : ""}`, (it, title) => { it.title = title; });
+      set(element, "title", `${signal.name}, ${signal.type}${signal.address && ` at ${signal.address}`}${signal.latch ? `, latch ${signal.latch}` : ""}${signal.reply ? `, reply: ${signal.reply}` : ""}${signal.comment && `: ${signal.comment}`}`, (it, title) => { it.title = title; });
       set(element, "expanded", signal.isOpen, (it, yes) => it.parts.open.setAttribute("aria-expanded", yes));
     },
     trend(element, { signal }) {

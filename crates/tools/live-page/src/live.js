@@ -95,7 +95,7 @@
     get("chosen").dataset.key = plant.keyOf(signal);
     write(get("chosen-name"), signal.name);
     const ways = { I: "to the PLC", Q: "from the PLC" };
-    const facts = [signal.address, signal.type, ways[signal.direction] ?? `written by ${signal.driver.stations[signal.station]}`].filter(Boolean);
+    const facts = [signal.comment, signal.address, signal.type, ways[signal.direction] ?? `written by ${signal.driver.stations[signal.station]}`].filter(Boolean);
     if (signal.latch) facts.push(`latch ${signal.latch}`);
     if (signal.reply) facts.push(`reply: ${signal.reply}`);
     if (plant.drivers.length > 1) facts.push(signal.driver.name);
@@ -310,6 +310,7 @@
     // The variables of a run have no address and no direction, and cannot be forced.
     document.body.classList.toggle("only-runs", plant.drivers.length > 0 && plant.drivers.every((driver) => driver.isRun));
     document.body.classList.toggle("is-recording", isRecording());
+    get("watch-folder").hidden = get("watch-folder").disabled = !plant.signals.some(({ folder }) => folder);
     list.renew();
     watch.look();
     analyser.renew();

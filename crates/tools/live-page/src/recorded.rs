@@ -402,6 +402,8 @@ impl Exhibit for ShownRecording {
                 },
                 data_type: signal.data_type.name(),
                 unit: signal.unit.as_deref().unwrap_or_default(),
+                comment: signal.comment(),
+                folder: signal.folder(),
                 station: signal.station,
                 direction: has_place.then_some(match signal.area {
                     Area::Input => "I",

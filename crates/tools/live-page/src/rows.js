@@ -65,14 +65,15 @@ const rows = (() => {
     const groups = new Map();
     for (const signal of others) {
       const { driver } = signal;
-      const prefix = watch.group === "prefix" ? prefixOf(driver, signal) : null;
-      const name = prefix ?? signal.station;
+      const isFolder = watch.group === "folder";
+      const part = isFolder ? signal.folder : watch.group === "prefix" ? prefixOf(driver, signal) : null;
+      const name = part ?? signal.station;
       const key = `g${driver.id}/${name}`;
-      const head = prefix === null ? { driver, station: signal.station } : { title: `${plant.drivers.length > 1 ? `${driver.name} · ` : ""}${prefix || "Others"}` };
-      if (!groups.has(key)) groups.set(key, [{ key, ...head, isRest: prefix === "" }, []]);
+      const head = part === null ? { driver, station: signal.station } : { title: `${plant.drivers.length > 1 ? `${driver.name} · ` : ""}${part || (isFolder ? "No folder" : "Others")}` };
+      if (!groups.has(key)) groups.set(key, [{ key, ...head, isRest: part === "" }, []]);
       groups.get(key)[1].push(signal);
     }
-    // Signals without a prefix come last.
+    // Signals without a prefix or a folder come last.
     for (const isRest of [false, true]) for (const [head, signals] of groups.values()) if (head.isRest === isRest) group(head, signals);
     return { rows, found };
   }

@@ -481,6 +481,8 @@ impl Exhibit for ShownRun {
             address: String::new(),
             data_type: signal.data_type.name(),
             unit: "",
+            comment: "",
+            folder: "",
             station: signal.station,
             direction: None,
             latch: None,

@@ -234,6 +234,10 @@ pub(crate) struct SignalJson<'a> {
     #[serde(rename = "type")]
     pub(crate) data_type: &'static str,
     pub(crate) unit: &'a str,
+    #[serde(skip_serializing_if = "str::is_empty")]
+    pub(crate) comment: &'a str,
+    #[serde(skip_serializing_if = "str::is_empty")]
+    pub(crate) folder: &'a str,
     pub(crate) station: usize,
     /// From the PLC's view, if there is one.
     pub(crate) direction: Option<&'static str>,

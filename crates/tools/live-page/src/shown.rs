@@ -220,6 +220,8 @@ impl Shown {
             address: signal.plc_address().to_string(),
             data_type: signal.data_type.name(),
             unit: signal.unit.as_deref().unwrap_or_default(),
+            comment: signal.comment(),
+            folder: signal.folder(),
             station: signal.station,
             direction: Some(match signal.plc_address().area {
                 Area::Input => "I",

@@ -25,13 +25,15 @@ const plant = (() => {
   let heard = 0;
 
   function signalOf(driver, given, index) {
-    const words = [given.name, given.address, given.unit ?? "", given.type, driver.isRun ? driver.stations[given.station] : ""];
+    const words = [given.name, given.address, given.unit ?? "", given.comment ?? "", given.type, driver.isRun ? driver.stations[given.station] : ""];
     const signal = {
       driver, index,
       name: given.name,
       address: given.address,
       type: given.type,
       unit: given.unit ?? "",
+      comment: given.comment ?? "",
+      folder: given.folder ?? "",
       station: given.station,
       direction: given.direction,
       latch: given.latch,

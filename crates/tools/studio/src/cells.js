@@ -18,6 +18,8 @@ const cells = (() => {
     { key: "fail_safe", title: "Fail-safe" },
     { key: "order", title: "Order" },
     { key: "station", title: "Station" },
+    { key: "comment", title: "Comment" },
+    { key: "folder", title: "Folder" },
   ];
   let columns = all;
   let sheet = null;
@@ -66,7 +68,7 @@ const cells = (() => {
   function show(newSheet, checked) {
     const name = sheet?.signals[shown[row]]?.name;
     sheet = newSheet;
-    columns = all.filter(({ key }) => (key !== "at" || tell.hasPlaces()) && (key !== "station" || sheet?.stations.length > 1));
+    columns = all.filter(({ key }) => (key !== "at" || tell.hasPlaces()) && (key !== "station" || sheet?.stations.length > 1) && (!["comment", "folder"].includes(key) || sheet?.signals.some((signal) => signal[key])));
     get("head").replaceChildren(...columns.map(({ key, title }) => make("span", `c-${key}`, title, "columnheader")), make("span", "c-value", "Value", "columnheader"));
     // The value stands behind the address, where it is seen on narrow screens as well.
     const widths = columns.map(({ key }) => `var(--c-${key})`);
@@ -99,7 +101,7 @@ const cells = (() => {
 
   function chooseRows() {
     const signals = sheet?.signals ?? [];
-    const has = (signal) => !words || `${signal.name} ${signal.address} ${signal.unit ?? ""} ${signal.type ?? ""}`.toLowerCase().includes(words);
+    const has = (signal) => !words || `${signal.name} ${signal.address} ${signal.unit ?? ""} ${signal.type ?? ""} ${signal.comment ?? ""}`.toLowerCase().includes(words);
     shown = signals.map((_, index) => index).filter((index) => has(signals[index]));
     get("found").textContent = words ? `${shown.length} of ${signals.length}` : `${signals.length}`;
     get("grid").setAttribute("aria-rowcount", String(signals.length + 1));

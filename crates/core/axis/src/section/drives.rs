@@ -358,5 +358,6 @@ fn signal(drive: &str, word: Word, byte: usize, setup: &Setup) -> Signal {
         dead_band: 0.0,
         range: None,
         in_plc: None,
+        notes: None,
     }
 }

@@ -229,7 +229,7 @@ pub fn printable(text: &str) -> String {
 
 /// True if a character has no visible form: a control character, or one that reverses the direction of the text around
 /// it, so that a name reads as another.
-pub(super) fn is_unprintable(c: char) -> bool {
+pub fn is_unprintable(c: char) -> bool {
     c.is_control()
         || matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }

@@ -13,7 +13,7 @@ mod syntax;
 mod table;
 
 pub use key::{Key, RequiredKey, Shape, TableKind, kind_names, names};
-pub use mistakes::{Collector, Mistakes, PlacedMistake, printable, shown};
+pub use mistakes::{Collector, Mistakes, PlacedMistake, is_unprintable, printable, shown};
 pub use nearest::{did_you_mean, nearest};
 pub use number::short_number;
 pub use source::{load_text, parse_text, read_text};

@@ -1,6 +1,7 @@
 //! Signals: named, typed, scaled values in the process image, and the codec plan made from them.
 
 mod address;
+mod notes;
 mod order;
 mod plan;
 mod raw;
@@ -11,6 +12,7 @@ mod table;
 mod types;
 
 pub use address::{AREA_LIMIT, Address, Addressing, Area, Width};
+pub use notes::{NOTE_LIMIT, Notes};
 pub use order::ByteOrder;
 pub use plan::{Conversions, Plan, fail_safe_frame};
 pub use raw::RawValues;

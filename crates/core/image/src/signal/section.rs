@@ -98,6 +98,8 @@ pub const KEYS: &[Key] = &[
     ),
     DEAD_BAND_KEY,
     STATION_KEY,
+    super::notes::COMMENT,
+    super::notes::FOLDER,
 ];
 
 const TYPES: [&str; DataType::ALL.len()] = {
@@ -200,6 +202,7 @@ pub fn read(mut table: Table<'_>, addressing: Addressing) -> Option<Section<'_>>
     let fail_safe = table.take("fail_safe");
     let dead_band = table.take("dead_band");
     let station = table.take("station");
+    let notes = super::notes::take(&mut table);
     let whole = table.is_whole();
     table.finish();
 
@@ -255,6 +258,7 @@ pub fn read(mut table: Table<'_>, addressing: Addressing) -> Option<Section<'_>>
             .unwrap_or_default(),
         range: None,
         in_plc: None,
+        notes,
     };
     let hold =
         hold.and_then(|value| fitting_hold(&value, held.flatten()?, &signal, latched.is_some()));

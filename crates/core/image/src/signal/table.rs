@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::{Address, Area, ByteOrder, DataType, Scale, Slot};
+use super::{Address, Area, ByteOrder, DataType, Notes, Scale, Slot};
 use tickbus_base::time::Nanos;
 
 /// Which edges of a BOOL signal must not be lost between two exchanges.
@@ -57,6 +57,8 @@ pub struct Signal {
     pub range: Option<[f64; 2]>,
     /// In an [observer's table](SignalTable::observed), where the PLC has a `%I` that the image has behind the `%Q`.
     pub in_plc: Option<Address>,
+    /// The comment and the folder, in a box because the tick has no use for them.
+    pub notes: Option<Box<Notes>>,
 }
 
 impl Signal {
@@ -80,7 +82,18 @@ impl Signal {
             dead_band: 0.0,
             range: None,
             in_plc: None,
+            notes: None,
         }
+    }
+
+    /// The comment; empty without one.
+    pub fn comment(&self) -> &str {
+        self.notes.as_ref().map_or("", |notes| &notes.comment)
+    }
+
+    /// The folder; empty without one.
+    pub fn folder(&self) -> &str {
+        self.notes.as_ref().map_or("", |notes| &notes.folder)
     }
 
     /// True if the slot holds a 64-bit integer and not a double: an unscaled LWORD, LINT or ULINT.

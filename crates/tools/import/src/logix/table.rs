@@ -6,6 +6,7 @@ use std::fmt::Write as _;
 use super::{cells, commented_point, kind_by_name, unknown};
 use crate::cells::{Cell, Record};
 use crate::device;
+use crate::xml::in_folder;
 use tickbus_base::toml_text::Collector;
 
 /// The headings of Studio 5000's table of tags.
@@ -59,7 +60,8 @@ pub(crate) fn table(records: &[Record], skipped: &Collector<'_>) -> Option<Vec<R
                 {
                     *has_points = true;
                     let texts = [&called, &*target].map(|whole| format!("{whole}{member}"));
-                    points.push(cells([&texts[0], &texts[1], kind, &comment], at));
+                    let point = cells([&texts[0], &texts[1], kind, &comment], at);
+                    points.push(in_folder(point, Some(&scope.text)));
                 }
                 continue;
             }
@@ -81,7 +83,8 @@ pub(crate) fn table(records: &[Record], skipped: &Collector<'_>) -> Option<Vec<R
                 "COMMENT" => path.text.as_str(),
                 _ => &called,
             };
-            points.push(cells([called, &path.text, kind, &comment], at));
+            let point = cells([called, &path.text, kind, &comment], at);
+            points.push(in_folder(point, Some(&scope.text)));
         }
     }
     for (target, path, has_points) in wholes {

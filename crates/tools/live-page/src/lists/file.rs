@@ -8,9 +8,10 @@ use tickbus_image::signal::section::NAME_LIMIT;
 use super::{List, Set};
 
 /// How the other signals are grouped; the first is what a list has without the key.
-const GROUPS: [(&str, &str); 3] = [
+const GROUPS: [(&str, &str); 4] = [
     ("station", "station"),
     ("prefix", "prefix"),
+    ("folder", "folder"),
     ("none", "none"),
 ];
 

@@ -85,7 +85,7 @@ fn a_recording_opens_at_its_end_and_goes_to_any_moment() {
     shoot(&browser, screenshots.as_deref(), "show", false);
     assert_fits(&browser);
     // Jumps to conditions, without a signal on the axis: by the field, its key and the bar.
-    browser.run("document.querySelector('[data-view=recording]').click(); document.getElementById('trigger-text').value = 'Level >= 40 and Valve == 1'");
+    browser.run("location.hash = '#recording'; document.getElementById('trigger-text').value = 'Level >= 40 and Valve == 1'");
     let when = |id: &str| {
         browser.run(&format!("document.getElementById('{id}').click()"));
     };

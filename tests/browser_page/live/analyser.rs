@@ -411,7 +411,7 @@ fn the_axis_is_there_again_after_a_reload() {
 #[test]
 fn a_trigger_that_slept_stops_at_the_first_of_many_changes() {
     let machine = worked();
-    let browser = opened(&machine, 1280, 800);
+    let browser = opened(&machine, 1280, 900);
     browser.run(
         "const ask = room.ask; const gate = new Promise((go) => { window.letGo = go; }); \
          room.ask = async (path, options) => { \

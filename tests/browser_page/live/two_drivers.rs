@@ -96,7 +96,7 @@ fn a_condition_is_about_the_driver_whose_signals_it_names() {
     let level = "Number(plant.signals.find((it) => it.name === 'Fast level').value)";
     browser.run(&format!(
         "window.limit = {level} + 3; document.getElementById('trigger-text').value = `Fast level > ${{limit}}`; \
-         document.querySelector('[data-view=recording]').click(); document.getElementById('arm').click()"
+         location.hash = '#recording'; document.getElementById('arm').click()"
     ));
     browser.wait("trigger.isArmed");
     wait_said(&browser, "Fast level > ");

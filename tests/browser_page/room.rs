@@ -194,6 +194,11 @@ fn look(browser: &Browser, page: &str) {
             let media = json!({"features": [{"name": "prefers-color-scheme", "value": scheme}]});
             browser.devtools("Emulation.setEmulatedMedia", &media);
             assert_fits(browser);
+            // The marked tab is in sight, and the row of tabs covers nothing that stays at the lower edge.
+            browser.wait(
+                "(() => { const [tabs, tab, tray] = ['#tabs', '#tabs [aria-current]', '#tray'].map((it) => document.querySelector(it)?.getBoundingClientRect()); \
+                 return tab.left >= -1 && tab.right <= innerWidth + 1 && (!tray || innerWidth > 700 || tray.bottom <= tabs.top + 1); })()",
+            );
             let name = format!("room_{}_{width}_{scheme}.png", page.replace('/', ""));
             shoot(browser, folder.as_deref(), &name, false);
         }

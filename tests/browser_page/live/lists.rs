@@ -113,6 +113,21 @@ fn a_list_is_made_by_hand_saved_beside_the_driver_and_shared_by_its_link() {
                  \"Valve\",\n    \"Level\",\n]\n\n[list.formats]\n\"Oven zone 2 heater\" = \"binary\"\n";
     assert!(text.ends_with(right), "{text}");
     assert_eq!(browser.run("return location.hash"), "#list=Level%20control");
+    // The view and the list have their places in the address, and Back leads to the view with its list.
+    click(&browser, "#tabs [href=\"/#signals\"]");
+    browser.wait("document.body.dataset.view === 'signals'");
+    let address = "return [document.body.dataset.view, location.hash, watch.name]";
+    let both = json!(["signals", "#signals&list=Level%20control", "Level control"]);
+    assert_eq!(browser.run(address), both);
+    click(&browser, "#tabs [href=\"/#line\"]");
+    browser.wait("document.body.dataset.view === 'line'");
+    browser.run("history.back()");
+    browser.wait("document.body.dataset.view === 'signals'");
+    assert_eq!(browser.run(address), both);
+    browser.run("history.back()");
+    browser.wait(
+        "document.body.dataset.view === 'overview' && location.hash === '#list=Level%20control'",
+    );
     let page = machine
         .url
         .split('#')

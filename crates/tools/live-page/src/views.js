@@ -1,7 +1,7 @@
 "use strict";
 
-// The views of the page: the overview, or one thing at a time over the whole window. The address has the view behind "#",
-// and each has a tab in the head.
+// The views of the page: the overview, or one thing at a time over the whole window. The address has the view behind "#", and
+// the list of signals, if it has a name: `#signals&list=NAME`. Each view has a tab in the head.
 
 const views = (() => {
   /** A phone, upright or on its side, has room for one thing at a time. */
@@ -24,14 +24,22 @@ const views = (() => {
   const fragmentOf = (view) => (view === "overview" ? "" : `#${view}`);
   const viewOf = (fragment) => fragment.slice(1) || "overview";
 
+  const parts = () => location.hash.slice(1).split("&");
+  const listPart = () => parts().find((part) => part.startsWith("list="));
+
+  function addressOf(view, list) {
+    const fragment = [fragmentOf(view).slice(1), list].filter(Boolean).join("&");
+    return location.pathname + location.search + (fragment && `#${fragment}`);
+  }
+
   const usual = () => (has.overview() ? "overview" : has.machine() ? "machine" : "signals");
 
   /** Takes the view from the address; what else is behind "#" belongs to other scripts. */
   function read() {
-    const hash = location.hash.slice(1);
-    if (NAMES.includes(hash)) asked = hash;
-    else if (hash === "") asked = "";
-    else if (hash.startsWith("list=")) asked = phone.matches ? "signals" : "";
+    const [first] = parts();
+    if (NAMES.includes(first)) asked = first;
+    else if (first === "") asked = "";
+    else if (first.startsWith("list=")) asked = phone.matches ? "signals" : "";
     redraw();
   }
 
@@ -60,8 +68,7 @@ const views = (() => {
 
   function go(view) {
     asked = view;
-    const path = location.pathname + location.search;
-    history.pushState(null, "", path + fragmentOf(view));
+    history.pushState(null, "", addressOf(view, listPart()));
     redraw();
   }
 
@@ -87,8 +94,21 @@ const views = (() => {
     tabs: {
       now: () => fragmentOf(now),
       has: (fragment) => has[viewOf(fragment)]?.() ?? true,
-      go(fragment) { if (viewOf(fragment) !== now) go(viewOf(fragment)); },
+      go(fragment) {
+        const view = viewOf(fragment);
+        // A view that was asked for and is empty now would come back by itself.
+        if (view !== now || (asked && asked !== view)) go(view);
+      },
     },
+    /** The name of the list in the address; null without one. */
+    get list() {
+      try {
+        return decodeURIComponent(listPart()?.slice("list=".length) ?? "") || null;
+      } catch {
+        return null;
+      }
+    },
+    set list(name) { history.replaceState(null, "", addressOf(asked, name && `list=${encodeURIComponent(name)}`)); },
     /** Shows a view, unless the overview shows it already. */
     reveal(view) { if (now !== "overview" && now !== view) go(view); },
     /** Sets what the page does after another view is shown. */

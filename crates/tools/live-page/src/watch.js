@@ -21,19 +21,9 @@ const watch = (() => {
   /** The number of changes of files, begun and ended: an answer from before one is out of date. */
   let changes = 0;
   let mayChange = false;
-  let wanted = linked();
+  let wanted = views.list;
   // After a reload the list is shown already, perhaps with changes.
   if (wanted === view.name) wanted = null;
-
-  /** The name of the list in the address, `/#list=NAME`. */
-  function linked() {
-    const given = /^#list=(.+)$/.exec(location.hash);
-    try {
-      return given && decodeURIComponent(given[1]);
-    } catch {
-      return null;
-    }
-  }
 
   const id = (key) => Number(key.slice(0, key.indexOf("/")));
   const nameOf = (key) => key.slice(key.indexOf("/") + 1);
@@ -75,7 +65,7 @@ const watch = (() => {
       read = new Map();
       view = structuredClone(own);
     }
-    history.replaceState(null, "", `${location.pathname}${location.search}${name ? `#list=${encodeURIComponent(name)}` : ""}`);
+    views.list = name;
     folded = new Set();
     changed();
     act.opened(view.pins.length > 0);
@@ -197,7 +187,7 @@ const watch = (() => {
       read.set(driver, is);
     }
     view.name = name;
-    history.replaceState(null, "", `${location.pathname}${location.search}#list=${encodeURIComponent(name)}`);
+    views.list = name;
     await look();
     changed();
     act.say(`The list "${name}" is saved in ${[...files.values()].map(({ file }) => file).join(", ")}.`);
@@ -252,7 +242,7 @@ const watch = (() => {
     else if (await save(name)) get("watch-new").value = "";
   });
   window.addEventListener("hashchange", () => {
-    wanted = linked();
+    wanted = views.list;
     if (wanted === view.name) wanted = null;
     if (wanted !== null) openWanted();
   });

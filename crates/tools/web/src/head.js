@@ -49,6 +49,10 @@ const head = (() => {
       if (paths[i] === current) tab.setAttribute("aria-current", "page");
       else tab.removeAttribute("aria-current");
     }
+    // On a phone the row of tabs scrolls.
+    const tab = nav.querySelector("[aria-current]");
+    const end = nav.scrollLeft + nav.clientWidth;
+    if (tab && (tab.offsetLeft < nav.scrollLeft || tab.offsetLeft + tab.offsetWidth > end)) nav.scrollLeft = tab.offsetLeft - (nav.clientWidth - tab.offsetWidth) / 2;
   }
 
   function showTabs(text) {
@@ -126,7 +130,7 @@ const head = (() => {
     });
   }
 
-  window.addEventListener("hashchange", mark);
+  for (const event of ["hashchange", "resize"]) window.addEventListener(event, mark);
 
   return {
     alarm,

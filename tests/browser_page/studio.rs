@@ -309,6 +309,10 @@ fn a_deleted_comment_leaves_the_cursor_in_its_column() {
     // A row is as wide as its cells.
     let over = "return [...document.querySelectorAll('#grid .row')].map((it) => it.scrollWidth - it.clientWidth)";
     assert_eq!(browser.run(over), json!([0, 0]));
+    // The chosen cell is seen.
+    browser.run("document.getElementById('grid').scrollLeft = 0; cells.go(0, 'folder')");
+    let right = "return document.querySelector('#rows [aria-selected=true]').getBoundingClientRect().right <= document.getElementById('grid').getBoundingClientRect().right";
+    assert_eq!(browser.run(right), json!(true));
     // A column before the chosen one appears.
     browser.run("cells.go(0, 'comment')");
     let placed = format!("{}\n[fieldbus.at]\nA = \"there\"\n", studio.text());

@@ -192,6 +192,8 @@ const cells = (() => {
     if (top < grid.scrollTop) grid.scrollTop = top;
     else if (top + ROW + head > grid.scrollTop + grid.clientHeight) grid.scrollTop = top + ROW + head - grid.clientHeight;
     draw();
+    const cell = document.getElementById(`cell-${shown[row]}-${columns[column].key}`);
+    if (cell) grid.scrollLeft = Math.max(Math.min(grid.scrollLeft, cell.offsetLeft), cell.offsetLeft + cell.offsetWidth - grid.clientWidth);
     tellChosen();
   }
 

@@ -288,6 +288,40 @@ fn what_is_typed_is_kept_and_reaches_no_other_signal() {
     browser.wait("tickbusStudio.file.sheet.driver.name === 'Half' && !tickbusStudio.isBusy");
 }
 
+/// The key that is typed next goes into the column of the deleted text, also in a file that has no such text any more.
+#[test]
+fn a_deleted_comment_leaves_the_cursor_in_its_column() {
+    let text = "[driver]\nid = 1\nname = \"T\"\n\n[fieldbus]\nkind = \"socket\"\naddress = \"127.0.0.1:0\"\n\n\
+                [[signal]]\nname = \"A\"\naddress = \"%IX0.0\"\ncomment = \"old\"\nfolder = \"IO\"\n";
+    let studio = Studio::new(Some(text));
+    let browser = open(&studio, 1200, 800);
+    browser.run("cells.go(0, 'comment')");
+    browser.keys(DELETE);
+    browser
+        .wait("tickbusStudio.file.sheet.signals[0].comment === undefined && !tickbusStudio.isBusy");
+    browser.keys(&format!("new{ENTER}"));
+    wait_cell(&browser, 0, "comment", "new");
+    assert!(
+        studio.text().contains("folder = \"IO\""),
+        "{}",
+        studio.text()
+    );
+    // A row is as wide as its cells.
+    let over = "return [...document.querySelectorAll('#grid .row')].map((it) => it.scrollWidth - it.clientWidth)";
+    assert_eq!(browser.run(over), json!([0, 0]));
+    // The chosen cell is seen.
+    browser.run("document.getElementById('grid').scrollLeft = 0; cells.go(0, 'folder')");
+    let right = "return document.querySelector('#rows [aria-selected=true]').getBoundingClientRect().right <= document.getElementById('grid').getBoundingClientRect().right";
+    assert_eq!(browser.run(right), json!(true));
+    // A column before the chosen one appears.
+    browser.run("cells.go(0, 'comment')");
+    let placed = format!("{}\n[fieldbus.at]\nA = \"there\"\n", studio.text());
+    fs::write(studio.file(), placed).expect("there is room");
+    browser.wait("document.querySelector('#head .c-at') !== null");
+    let chosen = "return document.querySelector('#rows [aria-selected=true]').dataset.key";
+    assert_eq!(browser.run(chosen), json!("comment"));
+}
+
 /// Why the line did not start is told until the file is another.
 #[test]
 fn a_corrected_mistake_is_no_reason_any_more() {

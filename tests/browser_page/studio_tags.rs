@@ -141,7 +141,7 @@ fn tags_of_an_asyncua_server_are_dragged_into_the_table_and_their_values_move() 
     drag(&browser, "Lamp", "document.getElementById('grid')");
     signals(&browser, "signals.length === 2");
     let wanted = "\n[fieldbus.at]\nLevel = \"nsu=urn:test:signals;s=Cell.Level\"\nLamp = \"nsu=urn:test:signals;s=Cell.Lamp\"\n\n\
-                  [[signal]]\nname    = \"Level\"\naddress = \"%QW0\"\ntype    = \"INT\"\n\n\
+                  [[signal]]\nname    = \"Level\"\naddress = \"%QW0\"\ntype    = \"INT\"\ncomment = \"Of the tank, in <b>mm</b>\"\n\n\
                   [[signal]]\nname    = \"Lamp\"\naddress = \"%QX2.0\"\n";
     let whole = studio.text();
     assert!(whole.ends_with(wanted), "{whole}");

@@ -290,6 +290,9 @@ fn variables_of_twincat_without_a_place_get_one_in_order_behind_the_others() {
         "{:?}",
         imported.skipped
     );
+    let method = "<TcPlcObject><POU Name=\"Main\"><Method Name=\"Scan\"><Declaration><![CDATA[VAR\nx AT %IX0.0 : BOOL;\nEND_VAR]]>\
+                  </Declaration></Method></POU></TcPlcObject>";
+    assert_eq!(notes(&read("Main.TcPOU", method)), ["x:  [Main]"]);
     let none = told(
         "IO.TcGVL",
         "<TcPlcObject><GVL><Declaration><![CDATA[VAR_GLOBAL\nx AT %I* : ST_In;\nEND_VAR]]></Declaration></GVL></TcPlcObject>",
@@ -390,7 +393,8 @@ fn the_tag_tables_of_tia_portal_as_xml_are_read() {
     let openness = "<Document><SW.Tags.PlcTagTable>\
                     <AttributeList><Name>Lamps</Name></AttributeList><ObjectList><SW.Tags.PlcTag><AttributeList><DataTypeName>Bool</DataTypeName>\
                     <LogicalAddress>%Q0.1</LogicalAddress><Name>Lamp</Name></AttributeList><ObjectList><MultilingualText>\
-                    <ObjectList><MultilingualTextItem><AttributeList><Text>green</Text></AttributeList></MultilingualTextItem>\
+                    <ObjectList><MultilingualTextItem><AttributeList><Text/></AttributeList></MultilingualTextItem>\
+                    <MultilingualTextItem><AttributeList><Text>green</Text></AttributeList></MultilingualTextItem>\
                     </ObjectList></MultilingualText></ObjectList></SW.Tags.PlcTag></ObjectList></SW.Tags.PlcTagTable></Document>";
     let imported = read("tags.xml", openness);
     assert_eq!(lines(&imported), ["Lamp %QX0.1 BOOL"]);
@@ -416,20 +420,22 @@ fn the_mapping_export_of_codesys_counts_elements_and_leaves_free_channels_out() 
                 //Mapped variable;//Parameter name @ counter in device;//Unit;//Description;//IEC address;//Device name;\n\
                 //Important: change only first, third or fourth column in Excel or add variable name before first ;\n\
                 ;Inputs;;;%IW1;Card;\nApplication.IO.Door;Bit0;;closed;%IX2.0;Card;\n;Bit1;;;%IX2.1;Card;\n\
-                Application.IO.Level;AI;;;%IW2;Card;\n";
+                Application.IO.Level;AI;;;%IW2;Card;\nApplication.PLC_PRG.arr[0].x;Q0;;;%QX0.0;Card;\n";
     let imported = read("map.csv", text);
     assert_eq!(
         lines(&imported),
         [
             "Application.IO.Door %IX2.0 BOOL",
-            "Application.IO.Level %IW4 WORD"
+            "Application.IO.Level %IW4 WORD",
+            "Application.PLC_PRG.arr[0].x %QX0.0 BOOL"
         ]
     );
     assert_eq!(
         notes(&imported),
         [
             "Application.IO.Door: closed [Application.IO]",
-            "Application.IO.Level:  [Application.IO]"
+            "Application.IO.Level:  [Application.IO]",
+            "Application.PLC_PRG.arr[0].x:  [Application.PLC_PRG]"
         ]
     );
     assert_eq!(imported.skipped.len(), 1);

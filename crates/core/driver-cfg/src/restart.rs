@@ -167,6 +167,14 @@ impl Drop for Others<'_> {
 
 /// The first property in which a signal differs, as an author calls it.
 fn difference(old: &Signal, new: &Signal) -> Option<impl Display> {
+    if old == new {
+        return None;
+    }
+    // The comment and the folder are texts for people, with which nothing works.
+    let without_notes = |signal: &Signal| Signal {
+        notes: None,
+        ..signal.clone()
+    };
     let properties = [
         (old.station != new.station, "station"),
         (old.data_type != new.data_type, "type"),
@@ -177,7 +185,6 @@ fn difference(old: &Signal, new: &Signal) -> Option<impl Display> {
         (old.order != new.order, "byte order"),
         (old.scale != new.scale || old.range != new.range, "scale"),
         (old.unit != new.unit, "unit"),
-        (old.notes != new.notes, "comment or folder"),
         (
             old.latch != new.latch || old.hold != new.hold,
             "latch or hold",
@@ -187,7 +194,7 @@ fn difference(old: &Signal, new: &Signal) -> Option<impl Display> {
             "fail_safe",
         ),
         // What is left: count_swallowed, dead_band and what the future brings.
-        (old != new, "setting"),
+        (without_notes(old) != without_notes(new), "setting"),
     ];
     let mut differing = properties.iter().filter(|(differs, _)| *differs);
     differing.next().map(|(_, what)| *what)
@@ -217,6 +224,9 @@ mod tests {
             assert_eq!(old.needs_restart(&new), [""; 0], "{to}");
             assert!(!old.has_line_of(&new), "{to}");
         }
+        let noted = TEXT.replace("\"%QW0\"", "\"%QW0\"\ncomment = \"main\"\nfolder = \"IO\"");
+        assert_eq!(old.needs_restart(&of(&noted)), [""; 0]);
+        assert!(old.has_line_of(&of(&noted)));
         assert!(old.has_line_of(&of(&format!("# a comment\n{TEXT}"))));
     }
 
@@ -239,11 +249,6 @@ mod tests {
                 "\"Lamp\"",
                 "\"Light\"",
                 "signal 1 \"Lamp\" has another name",
-            ),
-            (
-                "\"%QW0\"\n",
-                "\"%QW0\"\ncomment = \"main\"\n",
-                "signal 2 \"Valve\" has another comment or folder",
             ),
             (
                 "\"%QW0\"\n",

@@ -124,9 +124,11 @@ pub(super) fn codesys_mapping(records: &[Record], skipped: &Collector<'_>) -> Op
 
 /// The list or program of a mapped variable, `Application.IO` of `Application.IO.Door`.
 fn folder_of(variable: &Cell) -> Cell {
-    let folder = variable.text.rsplit_once('.');
+    let parts: Vec<&str> = variable.text.splitn(3, '.').collect();
+    // Further parts are elements of an array or structure.
+    let folder = &parts[..(parts.len() - 1).min(2)];
     Cell {
-        text: folder.map_or_else(String::new, |(folder, _)| folder.to_owned()),
+        text: folder.join("."),
         at: variable.at,
     }
 }

@@ -26,6 +26,7 @@ use std::path::Path;
 pub use condensed::condensed;
 pub use device::Client;
 pub use propose::{Point, Proposal, propose};
+pub use write::note;
 
 use cells::Record;
 use columns::Columns;

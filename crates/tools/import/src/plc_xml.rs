@@ -99,7 +99,7 @@ fn twincat(root: Node<'_, '_>, text: &str) -> Vec<Record> {
         // The text as in the file, so that its positions are those of the file.
         let from = range.start + text[range.clone()].find("<![CDATA[")?;
         let records = declarations::read(text, from, range.end);
-        let folder = node.parent().and_then(|parent| parent.attribute("Name"));
+        let folder = scope(node, &["POU", "GVL"], "Name");
         Some(records.into_iter().map(move |it| in_folder(it, folder)))
     });
     declarations.flatten().collect()
@@ -133,7 +133,9 @@ fn openness(root: Node<'_, '_>) -> Vec<Record> {
             (words(node), node.unwrap_or(tag).range().start)
         };
         let (address, kind) = (attribute("LogicalAddress"), attribute("DataTypeName"));
-        let comment = words(named(tag, "Text").next());
+        // One text for each language of the project.
+        let mut texts = named(tag, "Text").map(|text| words(Some(text)));
+        let comment = texts.find(|text| !text.is_empty()).unwrap_or_default();
         let record = record(
             tag,
             &attribute("Name").0,

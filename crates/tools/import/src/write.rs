@@ -186,7 +186,7 @@ pub(super) fn text(text: &str) -> String {
 }
 
 /// A text as the value of "comment" or "folder": one line, of printable characters, not too long.
-fn note(text: &str) -> String {
+pub fn note(text: &str) -> String {
     let printable: String = text
         .chars()
         .map(|c| if c.is_whitespace() { ' ' } else { c })

@@ -64,11 +64,12 @@ const cells = (() => {
     });
   }
 
-  /** Shows this sheet; the chosen row stays with its signal. */
+  /** Shows this sheet; the chosen row stays with its signal, and the chosen column with its key. */
   function show(newSheet, checked) {
     const name = sheet?.signals[shown[row]]?.name;
+    const chosenKey = columns[column]?.key;
     sheet = newSheet;
-    columns = all.filter(({ key }) => (key !== "at" || tell.hasPlaces()) && (key !== "station" || sheet?.stations.length > 1) && (!["comment", "folder"].includes(key) || sheet?.signals.some((signal) => signal[key])));
+    columns = all.filter(({ key }) => (key !== "at" || tell.hasPlaces()) && (key !== "station" || sheet?.stations.length > 1));
     get("head").replaceChildren(...columns.map(({ key, title }) => make("span", `c-${key}`, title, "columnheader")), make("span", "c-value", "Value", "columnheader"));
     // The value stands behind the address, where it is seen on narrow screens as well.
     const widths = columns.map(({ key }) => `var(--c-${key})`);
@@ -78,7 +79,7 @@ const cells = (() => {
     const again = shown.findIndex((index) => sheet.signals[index].name === name);
     if (again >= 0) row = again;
     row = Math.max(0, Math.min(row, shown.length - 1));
-    column = Math.min(column, columns.length - 1);
+    column = Math.max(0, columns.findIndex(({ key }) => key === chosenKey));
     draw();
     tellChosen();
   }
@@ -191,6 +192,8 @@ const cells = (() => {
     if (top < grid.scrollTop) grid.scrollTop = top;
     else if (top + ROW + head > grid.scrollTop + grid.clientHeight) grid.scrollTop = top + ROW + head - grid.clientHeight;
     draw();
+    const cell = document.getElementById(`cell-${shown[row]}-${columns[column].key}`);
+    if (cell) grid.scrollLeft = Math.max(Math.min(grid.scrollLeft, cell.offsetLeft), cell.offsetLeft + cell.offsetWidth - grid.clientWidth);
     tellChosen();
   }
 

@@ -45,18 +45,21 @@ const tags = (() => {
     }
   }
 
+  /** Many servers repeat the name as the comment. */
+  const commentOf = ({ name, comment }) => (comment === name ? "" : comment);
+
   function itemOf(tag, parent) {
     let isAbove = tag.id === OUTERMOST;
     for (let item = parent; item; item = item.parent) isAbove ||= item.tag.id === tag.id;
     const shown = isAbove ? { ...tag, opens: false, why: "this folder is open above" } : tag;
     const item = { tag: shown, parent, children: null, isOpen: false, isLoading: false, isMarked: false, note: "" };
     const level = parent ? Number(parent.element.getAttribute("aria-level")) + 1 : 1;
-    const { name, type, access, comment, at, id, why } = shown;
+    const { name, type, access, at, id, why } = shown;
     const sign = make("span", { className: "sign", textContent: shown.opens ? "▸" : "" });
     sign.setAttribute("aria-hidden", "true");
     const first = make("span", { className: "tag-name", textContent: name || id });
     const facts = make("span", { className: "tag-facts", textContent: [type, access].filter(Boolean).join(" · ") });
-    const second = make("span", { className: "tag-more", textContent: [comment === name ? "" : comment, at ?? id, why].filter(Boolean).join(" · ") });
+    const second = make("span", { className: "tag-more", textContent: [commentOf(shown), at ?? id, why].filter(Boolean).join(" · ") });
     item.element = make("li", { tabIndex: -1, draggable: canBe(item), className: canBe(item) ? "can-be" : "" }, sign, first, facts, second, make("span", { className: "tag-is" }), make("span", { className: "tag-note" }));
     item.element.setAttribute("role", "treeitem");
     item.element.setAttribute("aria-level", String(level));
@@ -179,7 +182,7 @@ const tags = (() => {
     tell.leave();
   }
 
-  const taken = ({ tag, parent }) => ({ name: tag.name, within: parent?.tag.name ?? "", at: tag.at, data_type: tag.dataType, area: get("tags-area").value || tag.area });
+  const taken = ({ tag, parent }) => ({ name: tag.name, within: parent?.tag.name ?? "", comment: commentOf(tag), at: tag.at, data_type: tag.dataType, area: get("tags-area").value || tag.area });
 
   async function add(items) {
     const list = items.filter(canBe);

@@ -6,6 +6,7 @@ use serde::Deserialize;
 use tickbus_base::toml_text::shown;
 use tickbus_image::signal::section::NAME_LIMIT;
 use tickbus_image::signal::{Area, DataType};
+use tickbus_import::note;
 use toml_edit::{DocumentMut, Item, Value};
 
 use crate::layout;
@@ -24,6 +25,9 @@ pub(crate) struct Taken {
     /// The name of the folder that it is in; can be empty.
     #[serde(default)]
     within: String,
+    /// The comment of the PLC; can be empty.
+    #[serde(default)]
+    comment: String,
     /// The address in the device.
     at: String,
     /// The data type, such as `INT`.
@@ -69,6 +73,10 @@ pub(crate) fn take(
         }
         if !station.is_empty() {
             pairs.push(("station".to_owned(), station.into()));
+        }
+        let comment = note(&tag.comment);
+        if !comment.is_empty() {
+            pairs.push(("comment".to_owned(), comment.into()));
         }
         new.push(layout::table(pairs, neighbour.as_ref()));
         names.insert(name.clone());

@@ -16,15 +16,17 @@ fn tag(name: &str, at: &str, data_type: &str, area: &str) -> Json {
 fn tags_become_signals_with_free_names_and_addresses_in_one_step() {
     let before = format!("{FILE}{AT}");
     let mut fixture = Fixture::new(&before);
+    let mut commented = tag("Level", "ns=2;s=A", "INT", "Q");
+    commented["comment"] = json!(" of the\ntank ");
     let tags = json!([
-        tag("Level", "ns=2;s=A", "INT", "Q"),
+        commented,
         tag("Level", "ns=2;s=B", "REAL", "I"),
         tag("Known", "ns=2;s=L", "INT", "Q"),
         tag(" ", "ns=2;s=C", "BOOL", "Q"),
     ]);
     assert_eq!(fixture.edit(take(&tags, 1)), Ok(()));
     let text = fixture.text();
-    let new = "latch   = \"rising\"\n\n[[signal]]\nname    = \"Tank.Level\"\naddress = \"%QW2\"\ntype    = \"INT\"\n\n\
+    let new = "latch   = \"rising\"\n\n[[signal]]\nname    = \"Tank.Level\"\naddress = \"%QW2\"\ntype    = \"INT\"\ncomment = \"of the tank\"\n\n\
                [[signal]]\nname    = \"Level 2\"\naddress = \"%ID4\"\ntype    = \"REAL\"\n\n\
                [[signal]]\nname    = \"Tag\"\naddress = \"%QX4.0\"\n";
     let lines = "\"ns=2;s=L\"\n\"Tank.Level\" = \"ns=2;s=A\"\n\"Level 2\" = \"ns=2;s=B\"\nTag = \"ns=2;s=C\"\n";

@@ -37,10 +37,11 @@ const line = (() => {
 
   /** The tools that give the simulation's model one of its faults. */
   function modelFaults(driver, parent) {
-    const form = make("form", "model", parent);
+    const form = make("form", "tools model", parent);
     const label = make("label", "", form, "Fault of the model ");
     const name = make("select", "", label);
     const value = make("input", "", make("label", "", form, "value "));
+    value.type = "text";
     value.inputMode = "decimal";
     value.size = 6;
     value.value = "1";

@@ -75,6 +75,21 @@ fn a_row_has_a_line_of_the_last_minute_before_the_moment_that_is_shown() {
 }
 
 #[test]
+fn one_slow_answer_does_not_stop_the_lines() {
+    let machine = Machine::tank();
+    let browser = open(&machine, 1440, 900);
+    wait_flat(&browser, "Level");
+    browser.run(
+        "window.asked = 0; const ask = room.ask; \
+         room.ask = async (path, options) => { \
+           if (path.startsWith('/trend/') && ++asked === 2) await new Promise((go) => setTimeout(go, 3000)); \
+           return ask(path, options); };",
+    );
+    browser.wait("asked > 3");
+    assert_quiet(&browser);
+}
+
+#[test]
 fn a_list_without_width_for_the_lines_asks_for_none() {
     let machine = Machine::tank();
     let browser = open(&machine, 1440, 900);

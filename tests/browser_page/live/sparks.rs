@@ -80,12 +80,17 @@ fn one_slow_answer_does_not_stop_the_lines() {
     let browser = open(&machine, 1440, 900);
     wait_flat(&browser, "Level");
     browser.run(
-        "window.asked = 0; const ask = room.ask; \
+        "window.asked = []; const ask = room.ask; \
          room.ask = async (path, options) => { \
-           if (path.startsWith('/trend/') && ++asked === 2) await new Promise((go) => setTimeout(go, 3000)); \
+           if (path.startsWith('/trend/') && asked.push(performance.now()) === 2) await new Promise((go) => setTimeout(go, 3000)); \
            return ask(path, options); };",
     );
-    browser.wait("asked > 3");
+    browser.wait("asked.length > 3");
+    let pause = browser.run("return asked[2] - asked[1]");
+    assert!(
+        pause.as_f64().is_some_and(|pause| pause < 20_000.0),
+        "{pause} ms after an answer of 3 s"
+    );
     assert_quiet(&browser);
 }
 

@@ -39,14 +39,21 @@ const trigger = (() => {
     if (text) field.focus();
   }
 
-  /** The text, and the driver that it is about: the one with the longest name in it. */
+  /** How much of a text is names of a driver's signals, in characters. */
+  function share(driver, text) {
+    const names = driver.signals.map(({ name }) => name).filter((name) => text.includes(name)).sort((a, b) => b.length - a.length);
+    const rest = names.reduce((rest, name) => rest.replace(new RegExp(`(?<!\\S)${name.replace(/[\\^$.*+?()[\]{}|]/g, "\\$&")}(?=$|[ <>=!])`, "g"), ""), text);
+    return text.length - rest.length;
+  }
+
+  /** The text, and the driver that it is about: the one whose names are most of it. */
   function wanted() {
     const text = field.value.trim();
-    let [best, longest] = [null, -1];
-    for (const driver of [driverOf(near), act.chosen()?.driver, bar.lead, ...plant.drivers]) {
+    let [best, most] = [null, -1];
+    for (const driver of new Set([driverOf(near), act.chosen()?.driver, bar.lead, ...plant.drivers])) {
       if (!driver?.past) continue;
-      const length = driver.signals.reduce((most, { name }) => (text.includes(name) ? Math.max(most, name.length) : most), 0);
-      if (length > longest) [best, longest] = [driver, length];
+      const own = share(driver, text);
+      if (own > most) [best, most] = [driver, own];
     }
     return { driver: best, text };
   }
@@ -94,8 +101,10 @@ const trigger = (() => {
     const own = new Set([...signals, act.chosen()].filter((it) => it?.driver.past));
     const all = own.size ? [...own] : plant.signals.slice(0, ROOM);
     insert.replaceChildren(new Option("Insert…", ""), ...all.flatMap(({ name, isBool, driver }) => (isBool ? ["", "not ", " rises", " falls", " changes"] : [" changes", " > ", " < ", " == "]).map((it) => {
-      const option = new Option(it === "not " ? it + name : name + it);
-      option.driver = driver.id;
+      const condition = it === "not " ? it + name : name + it;
+      const option = new Option(condition);
+      // The option's own text has single spaces only.
+      Object.assign(option, { condition, driver: driver.id });
       return option;
     })));
   }
@@ -103,9 +112,7 @@ const trigger = (() => {
   insert.addEventListener("change", () => {
     const option = insert.selectedOptions[0];
     near = option.driver;
-    field.value = (field.value.trim() ? `${field.value.trim()} and ` : "") + option.text;
-    // A number is written behind a sign.
-    if (/[<>=]$/.test(field.value)) field.value += " ";
+    field.value = (field.value.trim() ? `${field.value.trim()} and ` : "") + option.condition;
     insert.value = "";
     tell("");
     field.focus();

@@ -104,6 +104,11 @@ fn a_condition_is_about_the_driver_whose_signals_it_names() {
     browser.wait("trigger.isArmed");
     wait_said(&browser, "Fast level > ");
     browser.wait(&format!("bar.moment && {level} === limit + 1"));
+    let told = browser.run("return words.moment(bar.moment.ms)");
+    wait_said(
+        &browser,
+        &format!(": at {};", told.as_str().expect("a time")),
+    );
     let fast = browser.run("return plant.drivers[1].moment.tick").as_u64();
     browser.run("document.getElementById('trigger-text').value = 'Fast level changes'; document.getElementById('last-when').click()");
     let before = fast.expect("a tick") - 10;

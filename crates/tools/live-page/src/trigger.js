@@ -87,8 +87,11 @@ const trigger = (() => {
       tell(found.wrong);
     } else if (found.tick !== null) {
       disarm();
-      act.stop(driverOf(own.id), found);
-      act.say(`${own.text}: at ${words.moment(found.ms)}; the view has stopped there.${found.is_cut ? ` It may have happened before: ${lost}.` : ""}`, found.is_cut);
+      const driver = driverOf(own.id);
+      // As the bar shows it.
+      const at = words.moment(found.ms - bar.offset(driver));
+      act.stop(driver, found);
+      act.say(`${own.text}: at ${at}; the view has stopped there.${found.is_cut ? ` It may have happened before: ${lost}.` : ""}`, found.is_cut);
     } else {
       if (found.is_cut) act.say(`Waits on; but ${lost}, and it may have happened among them.`, true);
       // After a restart the ticks begin again.

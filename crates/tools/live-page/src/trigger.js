@@ -60,7 +60,7 @@ const trigger = (() => {
 
   async function next({ id, text, until }) {
     const answer = await room.ask(`/history/${id}/next/when/${until}/${encodeURIComponent(text)}`);
-    return answer.ok ? answer.json() : null;
+    return answer.ok ? answer.json() : { refused: await bar.refusal(answer) };
   }
 
   async function arm() {
@@ -68,8 +68,9 @@ const trigger = (() => {
     const own = { id: driver.id, text, until: driver.past.tick };
     const found = await next(own).catch(() => null);
     if (!found) return act.say("Nobody answers; wait until the page is live again.", true);
+    if (found.refused) return act.say(found.refused, true);
     tell(found.wrong ?? "");
-    if (found.wrong) return;
+    if (found.wrong) return act.say("");
     armed = own;
     act.follow();
     act.say("The view stops when it happens.");
@@ -80,11 +81,11 @@ const trigger = (() => {
   async function look() {
     const own = armed;
     const found = own && await next(own);
-    if (!found || armed !== own) return;
+    if (!found || found.refused || armed !== own) return;
     const lost = "the oldest changes have left the memory (history in [page])";
     if (found.wrong) {
       disarm();
-      tell(found.wrong);
+      act.say(`Nothing is waited for any more: ${found.wrong}`, true);
     } else if (found.tick !== null) {
       disarm();
       const driver = driverOf(own.id);
@@ -123,8 +124,10 @@ const trigger = (() => {
   field.addEventListener("input", () => tell(""));
   get("trigger").addEventListener("submit", (event) => {
     event.preventDefault();
-    if (armed) disarm();
-    else if (get("arm").hidden) bar.jump(true, "when");
+    if (armed) {
+      disarm();
+      act.say("");
+    } else if (get("arm").hidden) bar.jump(true, "when");
     else arm();
   });
 

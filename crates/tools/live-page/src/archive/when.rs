@@ -29,7 +29,7 @@ fn plain(condition: &str) -> String {
     let mut rest = number.chars().peekable();
     while let Some(c) = rest.next() {
         let is_within = plain.ends_with(|before: char| before.is_ascii_digit())
-            && rest.peek().is_some_and(|next| next.is_ascii_digit());
+            && rest.peek().is_some_and(char::is_ascii_digit);
         plain.push(match c {
             '−' => '-',
             ',' if is_within => '.',

@@ -296,6 +296,39 @@ fn the_trigger_stops_the_view_at_the_tick_of_the_change() {
         "condition.png",
         false,
     );
+    // No sentence stays after a cancel, or beside a mistake.
+    let is_silent = "document.getElementById('status').textContent === ''";
+    arm(&browser, "Level low rises");
+    wait_said(&browser, "The view stops when it happens.");
+    browser.run("document.getElementById('arm').click()");
+    browser.wait(is_silent);
+    // As the server answers a text of 24 kB, but without an error in the browser's console.
+    let refuse = "window.given = () => new Response('', { status: 431 })";
+    browser.run(&format!(
+        "const ask = room.ask; {refuse}; \
+         room.ask = (path, options) => (given && path.includes('/when/') ? Promise.resolve(given()) : ask(path, options))"
+    ));
+    for way in ["arm", "last-when"] {
+        browser.run(&format!(
+            "{refuse}; document.getElementById('{way}').click()"
+        ));
+        wait_said(&browser, "The server refuses the request (status 431)");
+        browser.run("given = null");
+        arm(&browser, "Levle > 100");
+        browser.wait(is_silent);
+    }
+    // The signal has another name after a restart of the program.
+    arm(&browser, "Level low rises");
+    browser.wait("trigger.isArmed");
+    browser.run("document.activeElement.blur(); given = () => Response.json({ wrong: 'there is no signal \"Level low\"' })");
+    wait_said(
+        &browser,
+        "Nothing is waited for any more: there is no signal \"Level low\"",
+    );
+    assert_eq!(
+        browser.run("given = null; return [trigger.isArmed, document.activeElement.tagName]"),
+        json!([false, "BODY"])
+    );
     arm(&browser, "Level > 100");
     browser.wait("trigger.isArmed && !document.getElementById('trigger-told').textContent");
     // The signal is above the limit already, so the trigger waits until it has been below.

@@ -75,6 +75,26 @@ fn a_row_has_a_line_of_the_last_minute_before_the_moment_that_is_shown() {
 }
 
 #[test]
+fn one_slow_answer_does_not_stop_the_lines() {
+    let machine = Machine::tank();
+    let browser = open(&machine, 1440, 900);
+    wait_flat(&browser, "Level");
+    browser.run(
+        "window.asked = []; const ask = room.ask; \
+         room.ask = async (path, options) => { \
+           if (path.startsWith('/trend/') && asked.push(performance.now()) === 2) await new Promise((go) => setTimeout(go, 3000)); \
+           return ask(path, options); };",
+    );
+    browser.wait("asked.length > 3");
+    let pause = browser.run("return asked[2] - asked[1]");
+    assert!(
+        pause.as_f64().is_some_and(|pause| pause < 20_000.0),
+        "{pause} ms after an answer of 3 s"
+    );
+    assert_quiet(&browser);
+}
+
+#[test]
 fn a_list_without_width_for_the_lines_asks_for_none() {
     let machine = Machine::tank();
     let browser = open(&machine, 1440, 900);

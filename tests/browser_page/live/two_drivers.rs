@@ -24,10 +24,13 @@ struct Ticking {
 
 impl Ticking {
     fn start(page: &LivePage, id: i32, name: &str, tick: Nanos) -> Self {
+        let gate = if name == "Fast" { "Gate" } else { "hold" };
         let text = format!(
             "[driver]\nid = {id}\nname = \"{name}\"\n[fieldbus]\nkind = \"loopback\"\nprogram = \"mirror\"\n\
              scan = \"1ms\"\ncycle = \"1ms\"\n[page]\n[[signal]]\nname = \"{name} level\"\naddress = \"%ID0\"\n\
-             type = \"REAL\"\n[[signal]]\nname = \"{name} back\"\naddress = \"%QD0\"\ntype = \"REAL\"\n"
+             type = \"REAL\"\n[[signal]]\nname = \"{name} back\"\naddress = \"%QD0\"\ntype = \"REAL\"\n\
+             [[signal]]\nname = \"Run  and hold\"\naddress = \"%IX4.0\"\ntype = \"BOOL\"\n\
+             [[signal]]\nname = \"{gate}\"\naddress = \"%IX4.1\"\ntype = \"BOOL\"\n"
         );
         let config = Config::parse("driver.cfg", &text, &tickbus::KINDS)
             .unwrap_or_else(|why| panic!("{why}"));
@@ -101,6 +104,11 @@ fn a_condition_is_about_the_driver_whose_signals_it_names() {
     browser.wait("trigger.isArmed");
     wait_said(&browser, "Fast level > ");
     browser.wait(&format!("bar.moment && {level} === limit + 1"));
+    let told = browser.run("return words.moment(bar.moment.ms)");
+    wait_said(
+        &browser,
+        &format!(": at {};", told.as_str().expect("a time")),
+    );
     let fast = browser.run("return plant.drivers[1].moment.tick").as_u64();
     browser.run("document.getElementById('trigger-text').value = 'Fast level changes'; document.getElementById('last-when').click()");
     let before = fast.expect("a tick") - 10;
@@ -110,6 +118,27 @@ fn a_condition_is_about_the_driver_whose_signals_it_names() {
     browser.run("document.getElementById('trigger-text').value = 'Fast level > 3 and Slow level > 3'; document.getElementById('last-when').click()");
     browser.wait(
         "document.getElementById('trigger-told').textContent.startsWith('there is no signal ')",
+    );
+    assert_quiet(&browser);
+}
+
+#[test]
+fn conditions_are_about_the_driver_that_has_all_their_names() {
+    let (_page, _drivers, _serving, browser) = opened();
+    browser.run("document.getElementById('trigger-text').value = 'Run  and hold and Gate'");
+    assert_eq!(browser.run("return trigger.wanted().driver.name"), "Fast");
+    browser.run("document.getElementById('trigger-text').value = 'Run  and hold and hold rises'");
+    assert_eq!(browser.run("return trigger.wanted().driver.name"), "Slow");
+    // A name is inserted with both of its spaces.
+    browser.run(
+        "document.getElementById('trigger-text').value = ''; \
+         list.select(plant.signals.find(({ name }) => name.startsWith('Run'))); \
+         const insert = document.getElementById('trigger-insert'); insert.selectedIndex = 3; \
+         insert.dispatchEvent(new Event('change'))",
+    );
+    assert_eq!(
+        browser.run("return document.getElementById('trigger-text').value"),
+        "Run  and hold rises"
     );
     assert_quiet(&browser);
 }

@@ -138,6 +138,12 @@ const bar = (() => {
     return show(`at/${ms}`, isStep, { driver, place: `tick/${found.tick}`, ms });
   }
 
+  /** Why the server refuses a request. A request that is too long gets an answer without a reason. */
+  async function refusal(answer) {
+    const { text } = await answer.json().catch(() => ({}));
+    return text ?? `The server refuses the request (status ${answer.status}); write a shorter condition.`;
+  }
+
   /** Goes to the next outage, fault, change or condition, or to the last one. */
   async function jump(isForward, goal = get("goal").value) {
     if (!lead) return;
@@ -151,8 +157,8 @@ const bar = (() => {
     const name = when ? `beginning of “${when.text}”` : goal === "signal" ? `change of ${signal.name}` : goal;
     try {
       const answer = await room.ask(path(driver, `${isForward ? "next" : "last"}/${what}/${from}${when ? `/${encodeURIComponent(when.text)}` : ""}`));
+      if (!answer.ok) return act.say(await refusal(answer), true);
       const found = await answer.json();
-      if (!answer.ok) return act.say(found.text, true);
       if (when) act.wrong(found.wrong ?? "");
       if (found.wrong) return;
       if (found.tick === null) return act.say(`There is no ${isForward ? "later" : "earlier"} ${name} in the recorded time.`, true);
@@ -306,7 +312,7 @@ const bar = (() => {
 
   setInterval(look, PERIOD);
   return {
-    redraw, key, show, live, step, jump, reach, offset, frames,
+    redraw, key, show, live, step, jump, reach, offset, refusal, frames,
     /** Sets what the page does: `say(text, isBad)`, `shown()`, `chosen()`, `when()`, `wrong(text)`. */
     begin(actions) { act = actions; },
     get moment() { return moment; },

@@ -11,6 +11,8 @@ const sparks = (() => {
   /** The same times as multiples of what an answer took: reading a long history costs the server much. */
   const PERIODS = 20;
   const PAUSES = 4;
+  /** The most that they get, in milliseconds. */
+  const LONGEST = 10000;
   /** The most points of a signal in that time, and the fewest of a request: those of two spans. */
   const POINTS = 240;
   const FEWEST = 10;
@@ -27,6 +29,8 @@ const sparks = (() => {
   let width = 0;
   /** No request before these times. */
   let [due, rested] = [0, 0];
+  /** How long the slowest answer of the last time took, in milliseconds. */
+  let last = 0;
   /** How often other rows or another moment were shown. */
   let changes = 0;
 
@@ -65,9 +69,12 @@ const sparks = (() => {
       }
       for (const { trend } of series) drop(trend, begin);
     }
-    rested = performance.now() + PAUSES * longest;
+    // One slow answer may have waited behind another request.
+    const usual = Math.min(longest, last);
+    last = longest;
+    rested = performance.now() + Math.min(PAUSES * usual, LONGEST);
     if (changes === before) {
-      due = Math.max(due, now + PERIODS * longest);
+      due = Math.max(due, now + Math.min(PERIODS * usual, LONGEST));
       frame.classList.remove("is-late");
     }
     draw();

@@ -39,21 +39,28 @@ const trigger = (() => {
     if (text) field.focus();
   }
 
-  /** The text, and the driver that it is about: the one with the longest name in it. */
+  /** How much of a text is names of a driver's signals, in characters. */
+  function share(driver, text) {
+    const names = driver.signals.map(({ name }) => name).filter((name) => text.includes(name)).sort((a, b) => b.length - a.length);
+    const rest = names.reduce((rest, name) => rest.replace(new RegExp(`(?<!\\S)${name.replace(/[\\^$.*+?()[\]{}|]/g, "\\$&")}(?=$|[ <>=!])`, "g"), ""), text);
+    return text.length - rest.length;
+  }
+
+  /** The text, and the driver that it is about: the one whose names are most of it. */
   function wanted() {
     const text = field.value.trim();
-    let [best, longest] = [null, -1];
-    for (const driver of [driverOf(near), act.chosen()?.driver, bar.lead, ...plant.drivers]) {
+    let [best, most] = [null, -1];
+    for (const driver of new Set([driverOf(near), act.chosen()?.driver, bar.lead, ...plant.drivers])) {
       if (!driver?.past) continue;
-      const length = driver.signals.reduce((most, { name }) => (text.includes(name) ? Math.max(most, name.length) : most), 0);
-      if (length > longest) [best, longest] = [driver, length];
+      const own = share(driver, text);
+      if (own > most) [best, most] = [driver, own];
     }
     return { driver: best, text };
   }
 
   async function next({ id, text, until }) {
     const answer = await room.ask(`/history/${id}/next/when/${until}/${encodeURIComponent(text)}`);
-    return answer.ok ? answer.json() : null;
+    return answer.ok ? answer.json() : { refused: await bar.refusal(answer) };
   }
 
   async function arm() {
@@ -61,8 +68,9 @@ const trigger = (() => {
     const own = { id: driver.id, text, until: driver.past.tick };
     const found = await next(own).catch(() => null);
     if (!found) return act.say("Nobody answers; wait until the page is live again.", true);
+    if (found.refused) return act.say(found.refused, true);
     tell(found.wrong ?? "");
-    if (found.wrong) return;
+    if (found.wrong) return act.say("");
     armed = own;
     act.follow();
     act.say("The view stops when it happens.");
@@ -73,15 +81,18 @@ const trigger = (() => {
   async function look() {
     const own = armed;
     const found = own && await next(own);
-    if (!found || armed !== own) return;
+    if (!found || found.refused || armed !== own) return;
     const lost = "the oldest changes have left the memory (history in [page])";
     if (found.wrong) {
       disarm();
-      tell(found.wrong);
+      act.say(`Nothing is waited for any more: ${found.wrong}`, true);
     } else if (found.tick !== null) {
       disarm();
-      act.stop(driverOf(own.id), found);
-      act.say(`${own.text}: at ${words.moment(found.ms)}; the view has stopped there.${found.is_cut ? ` It may have happened before: ${lost}.` : ""}`, found.is_cut);
+      const driver = driverOf(own.id);
+      // As the bar shows it.
+      const at = words.moment(found.ms - bar.offset(driver));
+      act.stop(driver, found);
+      act.say(`${own.text}: at ${at}; the view has stopped there.${found.is_cut ? ` It may have happened before: ${lost}.` : ""}`, found.is_cut);
     } else {
       if (found.is_cut) act.say(`Waits on; but ${lost}, and it may have happened among them.`, true);
       // After a restart the ticks begin again.
@@ -94,8 +105,10 @@ const trigger = (() => {
     const own = new Set([...signals, act.chosen()].filter((it) => it?.driver.past));
     const all = own.size ? [...own] : plant.signals.slice(0, ROOM);
     insert.replaceChildren(new Option("Insert…", ""), ...all.flatMap(({ name, isBool, driver }) => (isBool ? ["", "not ", " rises", " falls", " changes"] : [" changes", " > ", " < ", " == "]).map((it) => {
-      const option = new Option(it === "not " ? it + name : name + it);
-      option.driver = driver.id;
+      const condition = it === "not " ? it + name : name + it;
+      const option = new Option(condition);
+      // The option's own text has single spaces only.
+      Object.assign(option, { condition, driver: driver.id });
       return option;
     })));
   }
@@ -103,9 +116,7 @@ const trigger = (() => {
   insert.addEventListener("change", () => {
     const option = insert.selectedOptions[0];
     near = option.driver;
-    field.value = (field.value.trim() ? `${field.value.trim()} and ` : "") + option.text;
-    // A number is written behind a sign.
-    if (/[<>=]$/.test(field.value)) field.value += " ";
+    field.value = (field.value.trim() ? `${field.value.trim()} and ` : "") + option.condition;
     insert.value = "";
     tell("");
     field.focus();
@@ -113,8 +124,10 @@ const trigger = (() => {
   field.addEventListener("input", () => tell(""));
   get("trigger").addEventListener("submit", (event) => {
     event.preventDefault();
-    if (armed) disarm();
-    else if (get("arm").hidden) bar.jump(true, "when");
+    if (armed) {
+      disarm();
+      act.say("");
+    } else if (get("arm").hidden) bar.jump(true, "when");
     else arm();
   });
 

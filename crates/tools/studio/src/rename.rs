@@ -159,7 +159,7 @@ impl Renaming<'_> {
         }
         let rest = trimmed.strip_prefix(self.was)?;
         let words = rest.trim();
-        let is_edge = ["rises", "falls"].contains(&words) && rest.starts_with(' ');
+        let is_edge = ["rises", "falls", "changes"].contains(&words) && rest.starts_with(' ');
         let is_comparison = OPERATORS.iter().any(|sign| words.starts_with(sign));
         (is_edge || is_comparison).then(|| format!("{}{rest}", self.to))
     }

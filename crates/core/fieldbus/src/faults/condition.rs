@@ -193,8 +193,8 @@ fn number_of(text: &str, signal: &Signal) -> Result<(Number, f64), Mistake> {
     let text = text.trim();
     if signal.data_type == DataType::Bool
         && let Some(level) = match text {
-            "true" => Some(1.0),
-            "false" => Some(0.0),
+            _ if text.eq_ignore_ascii_case("true") => Some(1.0),
+            _ if text.eq_ignore_ascii_case("false") => Some(0.0),
             _ => None,
         }
     {
@@ -287,6 +287,8 @@ mod tests {
             ("run", true),
             ("run == 1", true),
             ("run == true", true),
+            ("run == TRUE", true),
+            ("run == False", false),
             ("run == false", false),
             ("run != 0", true),
             ("a = b > c", false),

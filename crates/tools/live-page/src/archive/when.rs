@@ -17,6 +17,28 @@ const AND: &str = " and ";
 /// The longest text of conditions, in bytes.
 const LONGEST: usize = 4096;
 
+/// The characters that can follow a name.
+const ENDS: [char; 5] = [' ', '<', '>', '=', '!'];
+
+/// A condition whose number is in the form that `Condition::parse` expects: people also write `2,5`, and the page writes
+/// `−1`.
+fn plain(condition: &str) -> String {
+    let (head, number) =
+        condition.split_at(condition.rfind(['<', '>', '=']).unwrap_or(condition.len()));
+    let mut plain = head.to_owned();
+    let mut rest = number.chars().peekable();
+    while let Some(c) = rest.next() {
+        let is_within = plain.ends_with(|before: char| before.is_ascii_digit())
+            && rest.peek().is_some_and(char::is_ascii_digit);
+        plain.push(match c {
+            '−' => '-',
+            ',' if is_within => '.',
+            c => c,
+        });
+    }
+    plain
+}
+
 /// The conditions of a text, all of which must hold.
 fn conditions(text: &str, table: &SignalTable) -> Result<Vec<Condition>, Mistake> {
     if text.trim().is_empty() {
@@ -38,7 +60,10 @@ fn conditions(text: &str, table: &SignalTable) -> Result<Vec<Condition>, Mistake
     let is_in_name = |at: &usize| {
         let mut places = names.iter().flat_map(|name| {
             let found = text.match_indices(name);
-            found.map(|(begin, _)| begin..begin + name.len())
+            let found = found.map(|(begin, _)| begin..begin + name.len());
+            // Another name may begin like it.
+            found
+                .filter(|place| text[place.end..].is_empty() || text[place.end..].starts_with(ENDS))
         });
         places.any(|place| place.contains(at))
     };
@@ -49,7 +74,10 @@ fn conditions(text: &str, table: &SignalTable) -> Result<Vec<Condition>, Mistake
         .filter(|at| !is_in_name(at))
         .chain(std::iter::once(text.len()))
     {
-        found.push(Condition::parse(&text[begin..end], table)?);
+        let own = &text[begin..end];
+        // A name may contain a comma.
+        let condition = Condition::parse(own, table);
+        found.push(condition.or_else(|_| Condition::parse(&plain(own), table))?);
         begin = end + AND.len();
     }
     Ok(found)
@@ -108,9 +136,10 @@ struct Forces {
 
 impl Archive {
     /// The next tick after this one at which the conditions of a percent-encoded text begin to hold, or the last one
-    /// before it: all of them hold there, and did not in the tick before. A condition on a value that is stale does not
-    /// hold. As JSON: `tick` (null if there is none) and `ms`, `until` (the last tick that was looked at) and `is_cut` (true
-    /// if ticks between `from` and the oldest one have left the memory); or `wrong`, with what is wrong with the text.
+    /// before it: all of them hold there, and did not in the tick before. An edge begins in each tick that has one, also in
+    /// the tick after another. A condition on a value that is stale does not hold. As JSON: `tick` (null if there is none)
+    /// and `ms`, `until` (the last tick that was looked at) and `is_cut` (true if ticks between `from` and the oldest one
+    /// have left the memory); or `wrong`, with what is wrong with the text.
     pub(crate) fn when(&self, text: &str, is_forward: bool, from: u64) -> String {
         let table = &self.facts.table;
         let text = percent_decoded(text);
@@ -354,8 +383,34 @@ mod tests {
             ("Start and stop falls and Run rises", &[]),
             ("Run falls and Start and stop rises", &[4]),
             ("Run%20and%20Level%20%3C%205", &[3, 6, 10]),
+            // As people and the page write numbers.
+            ("Level > 2,5", &[8]),
+            ("Level > −1 and Level == 4,4 ± 0,2", &[9]),
+            ("Run == TRUE", &[3, 5, 10]),
+            ("Run == False", &[2, 4, 8]),
         ] {
             assert_eq!(found(&archive, text), ticks, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_name_ends_where_the_word_ends() {
+        let signal = |name| Signal::new(name, Area::Output, 0, DataType::Bool);
+        let names = ["Run", "hold", "holding", "Run and hold", "Mix 1,5"];
+        let table = SignalTable {
+            signals: names.iter().copied().map(signal).collect(),
+            ..SignalTable::default()
+        };
+        for (text, wanted) in [
+            ("Run and holding", &[0, 2][..]),
+            ("Run and hold", &[3]),
+            ("Run and hold==1 and hold", &[3, 1]),
+            ("Run and hold rises and Run and holding", &[3, 0, 2]),
+            ("Mix 1,5 == 1 and Mix 1,5 falls", &[4, 4]),
+        ] {
+            let found = conditions(text, &table).unwrap_or_else(|why| panic!("{text}: {why}"));
+            let found: Vec<usize> = found.iter().map(|it| it.signal).collect();
+            assert_eq!(found, wanted, "{text}");
         }
     }
 

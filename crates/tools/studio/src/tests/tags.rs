@@ -51,7 +51,7 @@ fn a_new_name_is_followed_by_all_that_names_the_signal() {
 kind = "motor"
 contactor = "Level"  # the pump
 running = "Part seen"
-trip = ["not Level", "Levels > 3", "Level >= 5"]
+trip = ["not Level", "Levels > 3", "Level >= 5", "Level changes"]
 
 [[reply]]
 kind = "rule"
@@ -90,6 +90,7 @@ fault = "Level"
         ),
         ("\"not Level\"", "\"not Tank level\""),
         ("\"Level >= 5\"", "\"Tank level >= 5\""),
+        ("\"Level changes\"", "\"Tank level changes\""),
         ("{ \"Level\" = 3 }", "{ \"Tank level\" = 3 }"),
         ("{ Level = 1", "{ \"Tank level\" = 1"),
         ("{ signal = \"Level\", at", "{ signal = \"Tank level\", at"),

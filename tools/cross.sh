@@ -119,7 +119,7 @@ imports() {
 # The libraries that a file needs and that not every Windows has.
 foreign_dlls() {
     x86_64-w64-mingw32-objdump -p "$1" | sed -n 's/.*DLL Name: //p' | tr '[:upper:]' '[:lower:]' |
-        grep -vxE '(kernel32|ntdll|ws2_32|advapi32|bcrypt|bcryptprimitives|userenv|winmm|crypt32|ncrypt|secur32|ole32|shell32|user32|msvcrt|api-ms-win-[a-z0-9-]*)\.dll' || true
+        grep -vxE '(kernel32|ntdll|ws2_32|iphlpapi|advapi32|bcrypt|bcryptprimitives|userenv|winmm|crypt32|ncrypt|secur32|ole32|shell32|user32|msvcrt|api-ms-win-[a-z0-9-]*)\.dll' || true
 }
 
 # The versions of the C library that a file needs and that are newer than the oldest one.

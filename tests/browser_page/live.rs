@@ -224,7 +224,7 @@ impl Drop for Plc {
 fn open(machine: &Machine, width: u32, height: u32) -> Browser {
     let browser = Browser::start(width, height);
     browser.go(&machine.url);
-    // They come with the first event, and move what is below them.
+    // The tabs arrive with the first event, and push the content below them down.
     browser.wait("document.getElementById('tabs')?.hidden === false");
     browser.wait("document.getElementById('access').textContent === 'may force'");
     browser.wait("document.querySelector('.row.signal')");

@@ -73,6 +73,19 @@ pub struct Column {
 }
 
 impl Column {
+    /// The column of a signal or variable without an address, a scale and a unit.
+    pub const fn plain(name: String, data_type: DataType, station: String) -> Self {
+        Self {
+            name,
+            is_edges: false,
+            kind: ValueKind::of(data_type, false),
+            address: None,
+            data_type: Some(data_type),
+            unit: None,
+            station,
+        }
+    }
+
     /// True for a 64-bit integer that is a double because of a scale.
     pub(super) fn is_scaled_integer(&self) -> bool {
         let plain = |data_type| ValueKind::of(data_type, false) != self.kind;

@@ -12,7 +12,7 @@ use std::sync::{Arc, OnceLock};
 use tickbus_base::time::{Clock, Nanos};
 use tickbus_image::signal::{DataType, Slot};
 use tickbus_record::{
-    Column, Columns, MOST_COLUMNS, Options, Recorder, RecorderCounters, RecorderError, ValueKind,
+    Column, Columns, MOST_COLUMNS, Options, Recorder, RecorderCounters, RecorderError,
 };
 
 use crate::members::Members;
@@ -106,14 +106,8 @@ fn begin(
 }
 
 fn columns(run: &str, members: &Members) -> Columns {
-    let column = |name: &str, data_type, station: &str| Column {
-        name: name.to_owned(),
-        is_edges: false,
-        kind: ValueKind::of(data_type, false),
-        address: None,
-        data_type: Some(data_type),
-        unit: None,
-        station: station.to_owned(),
+    let column = |name: &str, data_type, station: &str| {
+        Column::plain(name.to_owned(), data_type, station.to_owned())
     };
     let variables = members.variables.iter().enumerate().map(|(at, variable)| {
         let writer = members.clients.get(members.writer(at));

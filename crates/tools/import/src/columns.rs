@@ -83,8 +83,7 @@ const SCALES: [&str; 5] = [
 const ORDERS: &[&str] = &["order", "byte order"];
 
 /// The variables that CODESYS maps to channels, by its `//CoDeSys Mapping Export`: name, address, type, comment, folder.
-/// `None`
-/// for any other table. Channels without a variable are reported to `skipped`.
+/// `None` for any other table. Channels without a variable are reported to `skipped`.
 pub(super) fn codesys_mapping(records: &[Record], skipped: &Collector<'_>) -> Option<Vec<Record>> {
     let head = records.first()?.first()?;
     if !head

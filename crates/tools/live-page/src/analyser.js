@@ -610,23 +610,21 @@ const analyser = (() => {
 
   // Signals are dragged from the list.
 
-  let isDragged = false;
+  let wanting = 0;
   get("window").addEventListener("dragstart", (event) => {
     const signal = event.target.closest?.(".row.signal")?.signal;
     if (!signal) return;
     event.dataTransfer.setData(KIND, plant.keyOf(signal));
     event.dataTransfer.setData("text/plain", signal.name);
     event.dataTransfer.effectAllowed = "copy";
-    isDragged = true;
     // A drag ends if the page changes while it begins.
-    setTimeout(() => {
-      if (!isDragged) return;
+    wanting = setTimeout(() => {
       get("analyser").hidden = false;
       get("analyser").classList.add("is-wanted");
     });
   });
   document.addEventListener("dragend", () => {
-    isDragged = false;
+    clearTimeout(wanting);
     get("analyser").classList.remove("is-wanted");
     get("analyser").hidden = !tracks.length;
   });

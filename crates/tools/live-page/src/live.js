@@ -297,6 +297,7 @@
     if (isOther && (list.kind === "forced" || list.kind === "failsafe")) list.choose();
   }
 
+  /** Puts a signal onto the axis, and keeps its row in sight. */
   function analyse(signal) {
     analyser.add(signal);
     // The axis may have taken the place of the signal's row.

@@ -156,17 +156,10 @@ impl ShownRun {
 
     /// An empty archive of the present variables.
     fn new_archive(&self) -> Archive {
-        let columns = self.signals.iter().map(|signal| Column {
-            name: signal.name.clone(),
-            is_edges: false,
-            kind: ValueKind::of(signal.data_type, false),
-            address: None,
-            data_type: Some(signal.data_type),
-            unit: None,
-            station: match self.members.clients.get(signal.station) {
-                Some(client) => client.name.clone(),
-                None => String::new(),
-            },
+        let columns = self.signals.iter().map(|signal| {
+            let writer = self.members.clients.get(signal.station);
+            let station = writer.map_or_else(String::new, |client| client.name.clone());
+            Column::plain(signal.name.clone(), signal.data_type, station)
         });
         let columns = Columns {
             driver: self.name.clone(),

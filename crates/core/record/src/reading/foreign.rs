@@ -177,15 +177,8 @@ impl<R: BufRead> ForeignReader<R> {
             name.truncate(open);
         }
         let path = scopes.iter().map(String::as_str).chain([name.as_str()]);
-        Ok(Some(Column {
-            name: path.collect::<Vec<_>>().join("."),
-            is_edges: false,
-            kind: ValueKind::of(data_type, false),
-            address: None,
-            data_type: Some(data_type),
-            unit: None,
-            station: String::new(),
-        }))
+        let name = path.collect::<Vec<_>>().join(".");
+        Ok(Some(Column::plain(name, data_type, String::new())))
     }
 
     /// Reads all changes of the next time.

@@ -1,7 +1,7 @@
 //! The marks of faults.
 
 use tickbus_image::signal::{DataType, Signal, Slot};
-use tickbus_record::{Column, Columns, ValueKind};
+use tickbus_record::{Column, Columns};
 
 use super::*;
 use crate::forcing::Way;
@@ -18,15 +18,7 @@ fn archive() -> Archive {
         driver: "x".to_owned(),
         role: "device".to_owned(),
         stations: Vec::new(),
-        columns: vec![Column {
-            name: "a".to_owned(),
-            is_edges: false,
-            kind: ValueKind::of(DataType::Byte, false),
-            address: None,
-            data_type: Some(DataType::Byte),
-            unit: None,
-            station: String::new(),
-        }],
+        columns: vec![Column::plain("a".to_owned(), DataType::Byte, String::new())],
     };
     let history = History::new(columns.clone(), 1 << 20);
     for number in 1..=20 {

@@ -137,9 +137,9 @@ struct Forces {
 impl Archive {
     /// The next tick after this one at which the conditions of a percent-encoded text begin to hold, or the last one
     /// before it: all of them hold there, and did not in the tick before. An edge begins in each tick that has one, also in
-    /// the tick after another. A condition on a value that is stale does not hold. As JSON: `tick` (null if there is none)
-    /// and `ms`, `until` (the last tick that was looked at) and `is_cut` (true if ticks between `from` and the oldest one
-    /// have left the memory); or `wrong`, with what is wrong with the text.
+    /// the tick after another. A condition does not hold while its value is stale. Returns JSON: `tick` (null if there is
+    /// none) and `ms`, `until` (the last tick that was looked at) and `is_cut` (true if ticks between `from` and the oldest
+    /// one have left the memory); or `wrong`, with what is wrong with the text.
     pub(crate) fn when(&self, text: &str, is_forward: bool, from: u64) -> String {
         let table = &self.facts.table;
         let text = percent_decoded(text);
@@ -254,7 +254,7 @@ mod tests {
 
     use tickbus_fieldbus::faults::{FaultStatus, Phase};
     use tickbus_image::signal::{Area, DataType, Signal};
-    use tickbus_record::{Column, Columns, History, Tick, ValueKind};
+    use tickbus_record::{Column, Columns, History, Tick};
 
     use super::*;
     use crate::archive::Facts;
@@ -272,15 +272,8 @@ mod tests {
             signal("Level", Area::Output, DataType::Real),
             signal("Phase", Area::Input, DataType::Int),
         ];
-        let column = |signal: &Signal| Column {
-            name: signal.name.clone(),
-            is_edges: false,
-            kind: ValueKind::of(signal.data_type, false),
-            address: None,
-            data_type: Some(signal.data_type),
-            unit: None,
-            station: String::new(),
-        };
+        let column =
+            |signal: &Signal| Column::plain(signal.name.clone(), signal.data_type, String::new());
         let columns = Columns {
             driver: "x".to_owned(),
             role: "device".to_owned(),
@@ -357,7 +350,7 @@ mod tests {
     fn every_condition_begins_where_it_holds_and_did_not_before() {
         let archive = archive(1, &TICKS, &[], 1 << 20);
         for (text, ticks) in [
-            // What holds in the first tick may have begun before.
+            // A condition that holds in the first tick may have begun before it.
             ("Run", &[3, 5, 10][..]),
             ("not Run", &[2, 4, 8]),
             ("Run == 1", &[3, 5, 10]),
@@ -506,7 +499,7 @@ mod tests {
             let answer = answer(&archive, text, true, from);
             (answer["tick"].as_u64(), answer["until"].as_u64())
         };
-        // It may be forced in a later tick.
+        // The forces of later ticks are not known yet.
         assert_eq!(next("Run", 0), (None, Some(9)));
         assert_eq!(next("Run", 12), (None, Some(12)));
         archive.note_faults(&[status(1, "Run", Phase::Active, 12)], 0, 20);

@@ -116,7 +116,8 @@ class PageInChromiumTest {
             try (NetPage page = NetPage.open("127.0.0.1:0", "First", scanning.watch)) {
                 address = page.address();
                 viewer.go(address);
-                viewer.await("document.getElementById('link').textContent === 'live'");
+                // The page is live before it has a state of the nets.
+                viewer.await("document.querySelector('#net-facts').textContent.startsWith('time')");
                 scanning.standStill();
                 viewer.await("document.querySelector('#net-old').innerText.startsWith('Not scanned for')");
                 viewer.shoot(PICTURES.resolve("still.png"));

@@ -224,7 +224,7 @@ const list = (() => {
       const isFolded = watch.isFolded(key);
       text(element, "fold", isFolded ? "▸" : "▾");
       set(element, "expanded", !isFolded, (it, yes) => it.parts.fold.setAttribute("aria-expanded", yes));
-      set(element, "label", full, (it, label) => it.parts.fold.setAttribute("aria-label", label));
+      set(element, "label", full, (it, label) => { it.parts.fold.setAttribute("aria-label", label); it.parts.name.title = label; });
     },
     missing(element, { pin }) {
       element.pin = pin;

@@ -190,6 +190,7 @@ impl Site for LiveSite {
         let tab = |(name, fragment, _): (&str, &str, bool)| Tab {
             name: name.to_owned(),
             fragment: fragment.to_owned(),
+            is_wide: fragment.is_empty(),
         };
         views.into_iter().filter(|view| view.2).map(tab).collect()
     }

@@ -1,5 +1,5 @@
-//! The requests about the past and about lists of signals, on a thread of their own: neither a search through a long
-//! history nor a slow disk must delay the present.
+//! The requests about the past and about lists of signals, on threads of their own: neither a search through a long history
+//! nor a slow disk must delay the present. Saving a day takes seconds, so another thread does that: meanwhile somebody scrubs.
 
 use std::io::{self, Cursor};
 use std::sync::Arc;
@@ -19,6 +19,8 @@ use crate::trends;
 /// The paths of the past.
 const HISTORY: &str = "/history/";
 const TREND: &str = "/trend/";
+/// The word for files in a path: `/history/ID/save/FROM/TO.vcd`.
+const SAVE: &str = "save";
 /// The path of the lists of signals: their file is read and written here, since a disk can be slow.
 const LISTS: &str = "/lists/";
 
@@ -27,7 +29,7 @@ const LARGEST: usize = 512 << 20;
 
 const JSON: &str = "application/json";
 
-/// A request; `None` ends the thread.
+/// A request; `None` ends a thread.
 type Wish = Option<Order>;
 
 enum Order {
@@ -35,21 +37,47 @@ enum Order {
     Change(Change, Answer<Outcome>),
 }
 
-/// The thread; dropping it ends it after the request that it works on.
+/// The threads.
 #[derive(Debug)]
 pub(crate) struct Past {
+    _looks: Worker,
+    _files: Worker,
+}
+
+/// The way to the threads.
+#[derive(Clone, Debug)]
+pub(crate) struct Door {
+    looks: Sender<Wish>,
+    files: Sender<Wish>,
+}
+
+/// A thread; dropping it ends it after the request that it works on.
+#[derive(Debug)]
+struct Worker {
     wishes: Sender<Wish>,
     thread: Option<JoinHandle<()>>,
 }
 
-/// The way to the thread.
-#[derive(Clone, Debug)]
-pub(crate) struct Door(Sender<Wish>);
-
 impl Past {
     pub(crate) fn open(model: Arc<Shared>) -> io::Result<(Self, Door)> {
+        let looks = Worker::start("page past", Arc::clone(&model))?;
+        let files = Worker::start("page files", model)?;
+        let door = Door {
+            looks: looks.wishes.clone(),
+            files: files.wishes.clone(),
+        };
+        let past = Self {
+            _looks: looks,
+            _files: files,
+        };
+        Ok((past, door))
+    }
+}
+
+impl Worker {
+    fn start(name: &str, model: Arc<Shared>) -> io::Result<Self> {
         let (wishes, taken) = channel::<Wish>();
-        let thread = thread::Builder::new().name("page past".to_owned());
+        let thread = thread::Builder::new().name(name.to_owned());
         let thread = thread.spawn(move || {
             // Doors may be left after the end, so the end of the queue is no signal.
             while let Ok(Some(order)) = taken.recv() {
@@ -63,16 +91,14 @@ impl Past {
                 }
             }
         })?;
-        let door = Door(wishes.clone());
-        let past = Self {
+        Ok(Self {
             wishes,
             thread: Some(thread),
-        };
-        Ok((past, door))
+        })
     }
 }
 
-impl Drop for Past {
+impl Drop for Worker {
     fn drop(&mut self) {
         // A thread that has ended is not there to be told.
         let _ = self.wishes.send(None);
@@ -93,12 +119,24 @@ impl Door {
 
     pub(crate) fn ask(&self, path: &str, answer: Answer<Option<Document>>) {
         // After the end nobody answers, which the room reports.
-        let _ = self.0.send(Some(Order::Get(path.to_owned(), answer)));
+        let _ = self
+            .to(path)
+            .send(Some(Order::Get(path.to_owned(), answer)));
+    }
+
+    /// The queue for a path.
+    fn to(&self, path: &str) -> &Sender<Wish> {
+        let mut parts = path.strip_prefix(HISTORY).unwrap_or_default().split('/');
+        if parts.nth(1) == Some(SAVE) {
+            &self.files
+        } else {
+            &self.looks
+        }
     }
 
     pub(crate) fn change(&self, change: Change, answer: Answer<Outcome>) {
         // As above.
-        let _ = self.0.send(Some(Order::Change(change, answer)));
+        let _ = self.looks.send(Some(Order::Change(change, answer)));
     }
 }
 
@@ -128,7 +166,7 @@ fn document(model: &Shared, path: &str) -> Option<Document> {
         [way @ ("next" | "last"), "when", tick, conditions] => {
             archive.when(conditions, way == "next", tick.parse().ok()?)
         }
-        ["save", from, file] => {
+        [SAVE, from, file] => {
             let id = id.parse().ok()?;
             let title = model.with(|model| model.driver(id).map(|it| it.name().to_owned()))?;
             return save(&archive, &title, from, file);
@@ -242,6 +280,23 @@ mod tests {
                 .collect(),
             ticks,
         )
+    }
+
+    #[test]
+    fn nobody_who_looks_waits_for_a_file_that_is_saved() {
+        let (looks, files) = (channel().0, channel().0);
+        let door = Door { looks, files };
+        for (path, is_file) in [
+            ("/history/1", false),
+            ("/history/1/at/5", false),
+            ("/history/1/next/when/0/save", false),
+            ("/trend/1/save/0", false),
+            ("/lists/1", false),
+            ("/history/1/save/0/9.vcd", true),
+            ("/history/1/save/0/9.html", true),
+        ] {
+            assert_eq!(std::ptr::eq(door.to(path), &door.files), is_file, "{path}");
+        }
     }
 
     #[test]

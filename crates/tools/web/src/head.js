@@ -60,7 +60,7 @@ const head = (() => {
     known = text;
     const pages = JSON.parse(text);
     paths = pages.map(({ path }) => path);
-    nav.replaceChildren(...pages.map(({ path, name }) => make("a", "", { href: path, textContent: name })));
+    nav.replaceChildren(...pages.map(({ path, name, wide }) => make("a", "", { href: path, textContent: name, className: wide ? "only-wide" : "" })));
     // The only tab is the way out of a page that has left.
     nav.hidden = pages.length === 0 || (pages.length === 1 && same(paths[0]));
     mark();

@@ -198,7 +198,7 @@ impl Pages {
         })
     }
 
-    /// The tabs, as the pages ask for them: their paths and names.
+    /// The tabs, as the pages ask for them: their paths and names, and those that need a wide window.
     pub(crate) fn tabs(&self) -> Json {
         let entries = self.entries();
         let mut tabs = Vec::new();
@@ -215,8 +215,9 @@ impl Pages {
             if own.is_empty() {
                 tabs.push(json!({ "path": path, "name": name }));
             }
-            for Tab { name, fragment } in own {
-                tabs.push(json!({ "path": format!("{path}{fragment}"), "name": name }));
+            for tab in own {
+                let path = format!("{path}{}", tab.fragment);
+                tabs.push(json!({ "path": path, "name": tab.name, "wide": tab.is_wide }));
             }
         }
         tabs.into()

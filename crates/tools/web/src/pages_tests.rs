@@ -178,6 +178,7 @@ fn a_page_can_have_several_tabs() {
     let tab = |name: &str, fragment: &str| Tab {
         name: name.to_owned(),
         fragment: fragment.to_owned(),
+        is_wide: fragment.is_empty(),
     };
     let own = vec![tab("Machine", ""), tab("Signals", "#signals")];
     Arc::get_mut(&mut live).expect("the only one").tabs = own;
@@ -187,4 +188,6 @@ fn a_page_can_have_several_tabs() {
         names(&pages),
         ["/ Machine", "/#signals Signals", "/board Board"]
     );
+    let tabs = pages.tabs();
+    assert_eq!([&tabs[0]["wide"], &tabs[1]["wide"]], [true, false]);
 }

@@ -97,6 +97,8 @@ pub struct Tab {
     pub name: String,
     /// The part of the address behind the path of the page, such as `#signals`; empty for the page itself.
     pub fragment: String,
+    /// True if it needs a wide window: a phone does not have it.
+    pub is_wide: bool,
 }
 
 /// A document made for one request.

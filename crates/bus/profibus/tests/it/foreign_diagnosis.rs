@@ -1,9 +1,10 @@
 //! Diagnoses that the simulation raises, read by profirust. (The integration tests have pyprofibus read some.)
 #![cfg(unix)]
 
-use crate::peer::Master;
+use crate::peer::{Master, Seen};
 use crate::pty;
 use crate::rig::{KINDS, OnPort, device, exchange, project, until, until_exchanging};
+use profirust::dp::PeripheralEvent;
 use tickbus_base::time::Monotonic;
 use tickbus_conformance::rig::{End, config, logged};
 
@@ -28,20 +29,35 @@ fn a_fault_raises_a_diagnosis_which_the_master_reads_once_and_takes_it_back() {
         ("slot = 2", &[0x42, 0b10]),
         ("octets = [0x11, 0x22]", &[0x03, 0x11, 0x22]),
     ] {
-        let before = master.first(|seen| seen.diagnoses);
-        let text = format!("kind = \"diagnosis\"\n{fault}");
-        let id = device.driver.inject_text(&text).expect("a right fault");
-        until(&mut device, "the master has read it", |_| {
-            master.first(|seen| seen.diagnosis == (WATCHDOG_ON | EXT_DIAG, block.to_vec()))
+        // On a busy machine the master can lose the station. It reads the diagnosis when it finds the station again, too, and
+        // does not report that, so such a round does not count.
+        let is_read_once = (0..5).any(|_| {
+            let others = |seen: &Seen| {
+                let events = seen.events.iter();
+                events
+                    .filter(|event| **event != PeripheralEvent::Diagnostics)
+                    .count()
+            };
+            let before = master.first(|seen| (seen.diagnoses, others(seen)));
+            let text = format!("kind = \"diagnosis\"\n{fault}");
+            let id = device.driver.inject_text(&text).expect("a right fault");
+            until(&mut device, "the master has read it", |_| {
+                master.first(|seen| seen.diagnosis == (WATCHDOG_ON | EXT_DIAG, block.to_vec()))
+            });
+            // The data exchange continues, and nobody reads the diagnosis again.
+            exchange(&mut device, &master, 7);
+            exchange(&mut device, &master, 8);
+            let after = master.first(|seen| (seen.diagnoses, others(seen)));
+            assert!(device.driver.end_fault(id));
+            until(&mut device, "the master has read that it is over", |_| {
+                master.first(|seen| seen.diagnosis == (WATCHDOG_ON, Vec::new()))
+            });
+            if after.1 == before.1 {
+                assert_eq!(after.0, before.0 + 1, "{fault}");
+            }
+            after.1 == before.1
         });
-        // The data exchange continues, and nobody reads the diagnosis again.
-        exchange(&mut device, &master, 7);
-        exchange(&mut device, &master, 8);
-        master.first(|seen| assert_eq!(seen.diagnoses, before + 1));
-        assert!(device.driver.end_fault(id));
-        until(&mut device, "the master has read that it is over", |_| {
-            master.first(|seen| seen.diagnosis == (WATCHDOG_ON, Vec::new()))
-        });
+        assert!(is_read_once, "the master loses the station all the time");
     }
 }
 

@@ -5,7 +5,7 @@ mod dp_phy;
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 
 use profirust::Baudrate;
@@ -95,8 +95,13 @@ impl Master {
     }
 
     pub fn all(&self) -> MutexGuard<'_, Vec<Seen>> {
-        self.seen.lock().expect("the master did not panic")
+        locked(&self.seen)
     }
+}
+
+/// What the master has seen, even after an assertion about it has failed: the master must go on, and end with its test.
+fn locked(seen: &Mutex<Vec<Seen>>) -> MutexGuard<'_, Vec<Seen>> {
+    seen.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Drop for Master {
@@ -140,7 +145,7 @@ fn run(mut phy: Pty, project: &Project, seen: &Mutex<Vec<Seen>>, over: &AtomicBo
         let events = dp.take_last_events();
         if let Some((handle, event)) = events.peripheral {
             let index = handles.iter().position(|own| *own == handle);
-            let mut seen = seen.lock().expect("no test has panicked with it");
+            let mut seen = locked(seen);
             let seen = &mut seen[index.expect("one of them")];
             let slave = dp.get_mut(handle);
             if event == PeripheralEvent::DataExchanged {

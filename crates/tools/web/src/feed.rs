@@ -28,7 +28,7 @@ const KEPT: usize = 4;
 pub(crate) struct Feed {
     site: Arc<dyn Site>,
     state: watch::Sender<Newest>,
-    /// Changes so far.
+    /// Changes so far, and viewers who may get no earlier state.
     changes: AtomicU64,
     /// There was a change: cut the pause short.
     hurry: Notify,
@@ -244,6 +244,12 @@ impl Feed {
 }
 
 impl Viewer {
+    /// Has the next event be of a look that begins from now on: who asks once must not get what was true before.
+    pub(crate) fn from_now(mut self) -> Self {
+        self.changes = self.feed.changes.fetch_add(1, Ordering::Relaxed) + 1;
+        self
+    }
+
     /// The number of answered looks. While it does not grow, the page may be outdated.
     pub(crate) fn looks(&self) -> u64 {
         self.feed.looks.load(Ordering::Relaxed)

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use serde_json::{Value as Json, json};
 
-use crate::site::{Answer, Asset, Change, Document, Outcome, Site, Tab};
+use crate::site::{Answer, Asset, Change, Document, Outcome, Site};
 
 /// The pages that a [`Room`](crate::Room) serves together: they share its address, its token and its tabs.
 ///

@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::*;
-use crate::site::{State, Verb};
+use crate::site::{State, Tab, Verb};
 
 /// A page that keeps the changes that it gets.
 struct Toy {

@@ -167,7 +167,8 @@ async fn get(
         hall.feeds
             .subscribe(if page.is_empty() { "/" } else { page })
     };
-    if let Some(mut viewer) = viewer("/state") {
+    if let Some(viewer) = viewer("/state") {
+        let mut viewer = viewer.from_now();
         let state = timeout(hall.patience, viewer.next()).await;
         let state = state.map_err(|_| hung())?;
         return Ok(full(JSON, json(&state.ok_or_else(nobody)?)));

@@ -442,6 +442,20 @@ fn a_change_during_a_look_keeps_nobody_from_seeing_it() {
 }
 
 #[test]
+fn who_asks_for_the_state_gets_none_from_before() {
+    let fixture = serve(Limits::default());
+    // While somebody looks, there is always a state.
+    let mut viewer = fixture.view();
+    assert_eq!(viewer.state(), "\"\"");
+    for n in 0..20 {
+        // Not by a change through the room, of which it would know.
+        *fixture.toy.text.lock().expect("no panic") = n.to_string();
+        let answer = fixture.ask("GET /state", "", "");
+        assert!(answer.ends_with(&format!("\"{n}\"")), "{n}: {answer}");
+    }
+}
+
+#[test]
 fn a_site_that_answers_nothing_has_no_beat() {
     let fixture = serve(Limits::default());
     let mut viewer = fixture.view();

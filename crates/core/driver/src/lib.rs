@@ -49,5 +49,5 @@ pub use status::Code;
 pub use supervise::panic_text;
 pub use tick::Exchange;
 pub use tick_counters::TickCounters;
-pub use view::{StationView, View};
+pub use view::{FailSafeValues, StationView, View};
 pub use watch::{Force, Watch};

@@ -1,7 +1,7 @@
 //! The copy of a tick that another thread can see.
 
 use tickbus_base::time::Nanos;
-use tickbus_image::signal::Slot;
+use tickbus_image::signal::{Signal, Slot};
 
 use super::tick_counters::TickTimes;
 use super::{Code, TickCounters};
@@ -43,10 +43,32 @@ pub struct StationView {
     pub age: Nanos,
     /// True if the station's data are valid: its PLC runs, and signals that should change do.
     pub is_valid: bool,
-    /// True if the slots of the values that the station sends hold fail-safe values.
-    pub is_fail_safe: bool,
+    /// The values of the station that are fail-safe values.
+    pub fail_safe: FailSafeValues,
     /// Bus cycles that have arrived.
     pub cycles: u64,
+}
+
+/// Which values that a station sends are fail-safe values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FailSafeValues {
+    /// None: the data are the station's.
+    None,
+    /// Those of the signals that state one; the others keep their last value.
+    Stated,
+    /// All.
+    All,
+}
+
+impl FailSafeValues {
+    /// True if this signal of the station has its fail-safe value.
+    pub fn has(self, signal: &Signal) -> bool {
+        match self {
+            Self::None => false,
+            Self::Stated => signal.states_fail_safe,
+            Self::All => true,
+        }
+    }
 }
 
 impl View {
@@ -56,7 +78,7 @@ impl View {
             status: Code::Stale,
             age: Nanos::MAX,
             is_valid: true,
-            is_fail_safe: true,
+            fail_safe: FailSafeValues::All,
             cycles: 0,
         };
         Self {

@@ -8,7 +8,7 @@ use tickbus_image::signal::Slot;
 use super::bus_handle::{BusHandle, SteppedBus};
 use super::recording::remember;
 use super::tick::Tick;
-use super::view::{StationView, View};
+use super::view::{FailSafeValues, StationView, View};
 use super::watch::Watch;
 use super::{Code, Driver};
 
@@ -78,7 +78,11 @@ impl Driver {
                 status: station.status,
                 age: self.image.peers.age(index, now),
                 is_valid: self.image.peers.is_valid(index),
-                is_fail_safe: station.stale,
+                fail_safe: if station.stale {
+                    FailSafeValues::All
+                } else {
+                    FailSafeValues::None
+                },
                 cycles: self.image.peers.received(index),
             };
             self.image

@@ -150,7 +150,7 @@ impl Shown {
                 let is_fail_safe = if signal.area == writes {
                     has_stopped
                 } else {
-                    view.stations[signal.station].is_fail_safe
+                    view.stations[signal.station].fail_safe.has(signal)
                 };
                 let mut flags = if is_fail_safe { FAIL_SAFE } else { 0 };
                 if signal.area != writes && stale[signal.station] {

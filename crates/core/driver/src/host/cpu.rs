@@ -86,7 +86,9 @@ impl Cpu {
             own.received(units);
         }
         for unit in &mut *units {
-            unit.run(now, in_time, &self.scan_counters);
+            let station = unit.station;
+            let bent = own.iter().flat_map(|own| own.bent_inputs(station));
+            unit.run(now, in_time, &self.scan_counters, bent);
         }
         if let Some(own) = own {
             own.sending(now, units);

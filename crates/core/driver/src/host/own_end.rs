@@ -9,7 +9,7 @@ use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::faults::{Effect, FaultBoard, Slots, TickTime};
 use tickbus_fieldbus::{MaxAge, Role, is_stale};
 use tickbus_image::TickEnd;
-use tickbus_image::signal::{Plan, Slot};
+use tickbus_image::signal::{Plan, Signal, Slot};
 use tickbus_record::Recorder;
 use tickbus_reply::Replies;
 
@@ -171,6 +171,15 @@ impl OwnEnd {
         }
     }
 
+    /// The signals of a station whose inputs are bent in this scan.
+    pub(super) fn bent_inputs(&self, station: usize) -> impl Iterator<Item = &Signal> {
+        let is_bent = self.is_bent && self.extras.is_busy();
+        let bent = is_bent.then(|| self.extras.bent(false));
+        let signals = bent.into_iter().flatten();
+        let signals = signals.map(|signal| &self.config.table.signals[signal]);
+        signals.filter(move |signal| signal.station == station)
+    }
+
     /// Puts the replies and the heartbeats into the outputs, and prepares the values for [`bend_outputs`](Self::bend_outputs).
     pub(super) fn sending(&mut self, now: Nanos, units: &mut [Unit]) {
         let is_bent = self.extras.bent(true).next().is_some();
@@ -275,7 +284,7 @@ impl OwnEnd {
                     },
                     age,
                     is_valid,
-                    is_fail_safe: unit.is_fail_safe(),
+                    fail_safe: unit.fail_safe(),
                     cycles: peers.received(index),
                 };
                 code = code.worse(seen.status);
@@ -387,6 +396,23 @@ mod tests {
             cpu.scan(now, true);
             bus.attend(now, None);
             assert_eq!(bus.outgoing(0, now), [first, 0xf0, high, low], "{millis}");
+        }
+    }
+
+    #[test]
+    fn a_machine_without_a_plc_gets_what_is_forced_and_not_the_fail_safe_value() {
+        let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nlink = \"x\"\n\
+                    [[signal]]\nname = \"on\"\naddress = \"%QX0.0\"\nfail_safe = false\n\
+                    [[signal]]\nname = \"running\"\naddress = \"%IX0.0\"\n\
+                    [[signal]]\nname = \"level\"\naddress = \"%IW2\"\n\
+                    [[reply]]\nkind = \"follows\"\nsignal = \"running\"\nwhen = \"on\"\n\
+                    [[fault]]\nkind = \"stuck\"\nsignal = \"on\"\nvalue = 1\nat = \"2ms\"\nfor = \"1ms\"\n";
+        let (mut cpu, mut bus) = with_own_end(text);
+        for (millis, expected) in [(0, 0), (1, 0), (2, 1), (3, 0)] {
+            let now = Nanos::from_millis(millis);
+            cpu.scan(now, true);
+            bus.attend(now, None);
+            assert_eq!(bus.outgoing(0, now)[0] & 1, expected, "{millis}");
         }
     }
 

@@ -112,7 +112,7 @@ impl SteppedHost {
                 }
                 Arrival { stale, ..arrival }
             });
-            unit.run(now, true, &self.scan_counters);
+            unit.run(now, true, &self.scan_counters, std::iter::empty());
             unit.count_outputs(&self.scan_counters);
             line.outputs
                 .write(|frame| copy_frame(frame, unit.outputs()));

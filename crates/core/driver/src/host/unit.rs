@@ -2,6 +2,7 @@
 
 use crate::Code;
 use crate::frames::area_bytes;
+use crate::view::FailSafeValues;
 use tickbus_base::time::Nanos;
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::Role;
@@ -61,9 +62,15 @@ impl Unit {
         self.arrival = Some(take(&mut self.inputs));
     }
 
-    /// Runs the program on the inputs.
+    /// Runs the program on the inputs, of which these signals are bent.
     #[inline]
-    pub(super) fn run(&mut self, now: Nanos, in_time: bool, scan_counters: &ScanCounters) {
+    pub(super) fn run<'a>(
+        &mut self,
+        now: Nanos,
+        in_time: bool,
+        scan_counters: &ScanCounters,
+        bent: impl Iterator<Item = &'a Signal>,
+    ) {
         let Self {
             program,
             counted: (written, read),
@@ -86,7 +93,7 @@ impl Unit {
             alive: self.is_alive,
             cycle: arrival.sequence,
             inputs: match fail_safe {
-                Some(fail_safe) if !self.is_alive => fail_safe.apply(&inputs.bytes),
+                Some(fail_safe) if !self.is_alive => fail_safe.apply(&inputs.bytes, bent),
                 _ => &inputs.bytes,
             },
             outputs,
@@ -107,10 +114,13 @@ impl Unit {
         }
     }
 
-    /// Returns true if all of these were fail-safe values.
-    pub(super) fn is_fail_safe(&self) -> bool {
-        let is_whole = self.fail_safe.as_ref().is_some_and(|it| it.is_whole);
-        is_whole && !self.is_alive
+    /// Returns which of these were fail-safe values.
+    pub(super) fn fail_safe(&self) -> FailSafeValues {
+        if self.fail_safe.is_some() && !self.is_alive {
+            FailSafeValues::Stated
+        } else {
+            FailSafeValues::None
+        }
     }
 
     /// Returns the outputs as the program left them.
@@ -145,8 +155,6 @@ impl Unit {
 /// signals keep their last value, as on a pulled plug.
 struct FailSafe {
     stated: Vec<Signal>,
-    /// True if every signal states a value.
-    is_whole: bool,
     frame: Box<[u8]>,
     /// The values that the program sees.
     seen: Box<[u8]>,
@@ -156,23 +164,25 @@ impl FailSafe {
     fn new(config: &Config, station: usize, area: Area) -> Self {
         let table = &config.table;
         let of_it = |it: &&Signal| it.station == station && it.area == area;
-        let signals: Vec<&Signal> = table.signals.iter().filter(of_it).collect();
-        let stated = signals.iter().filter(|it| it.states_fail_safe);
-        let stated: Vec<Signal> = stated.copied().cloned().collect();
+        let signals = table.signals.iter().filter(of_it);
+        let stated = signals.filter(|it| it.states_fail_safe);
         let frame = fail_safe_frame(table, station, area);
         Self {
-            is_whole: stated.len() == signals.len(),
-            stated,
+            stated: stated.cloned().collect(),
             seen: frame.clone(),
             frame,
         }
     }
 
+    /// Puts the stated values in place of the inputs, but for those that are bent: forced, for example.
     #[inline]
-    fn apply(&mut self, inputs: &[u8]) -> &[u8] {
+    fn apply<'a>(&mut self, inputs: &[u8], bent: impl Iterator<Item = &'a Signal>) -> &[u8] {
         copy_frame(&mut self.seen, inputs);
         for signal in &self.stated {
             take_over(signal, &self.frame, &mut self.seen);
+        }
+        for signal in bent {
+            take_over(signal, inputs, &mut self.seen);
         }
         &self.seen
     }

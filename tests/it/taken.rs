@@ -81,6 +81,10 @@ fn a_modbus_plc_moves_to_another_port_while_the_machine_runs() {
     eventually("the line is down", || {
         (machine.state() == "failed").then_some(())
     });
+    // Its page names the PLC that is meant now, which has never come.
+    let line = machine.get("/line")["drivers"][0].take();
+    let told = (&line["end"], &line["address"], &line["has_run"]);
+    assert_eq!(told, (&json!("client"), &json!(nowhere), &json!(false)));
     let (status, why) = machine.set("address", nowhere, &here);
     assert_eq!(status, 200, "{why}");
     first.set("Speed", 12.0);
@@ -153,4 +157,28 @@ fn a_page_that_other_computers_reach_edits_nothing() {
     assert_eq!(mirror.status.code(), Some(1));
     let told = String::from_utf8_lossy(&mirror.stderr);
     assert!(told.contains("other computers must not edit"), "{told}");
+}
+
+#[test]
+fn a_bus_knows_which_end_opens_its_connection() {
+    for (bus, connects) in [
+        ("kind = \"socket\"\nrole_tcp = \"connect\"", true),
+        ("kind = \"socket\"", false),
+        ("kind = \"dispatcher\"", true),
+        ("kind = \"modbus-client\"", true),
+        ("kind = \"modbus-server\"", false),
+    ] {
+        let text = format!(
+            "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\n{bus}\naddress = \"127.0.0.1:1999\"\n\
+             [[signal]]\nname = \"a\"\naddress = \"%IX0.0\"\n"
+        );
+        let config = tickbus::driver_cfg::Config::parse("driver.cfg", &text, &tickbus::KINDS);
+        let config = config.unwrap_or_else(|wrong| panic!("{wrong}"));
+        assert_eq!(config.bus.connects(), connects, "{bus}");
+        assert_eq!(
+            config.bus.address().as_deref(),
+            Some("127.0.0.1:1999"),
+            "{bus}"
+        );
+    }
 }

@@ -59,6 +59,10 @@ impl BusOptions for Options {
         Some(CYCLE)
     }
 
+    fn connects(&self) -> bool {
+        self.tcp == TcpRole::Connect
+    }
+
     fn address(&self) -> Option<String> {
         Some(self.address.to_string())
     }

@@ -44,7 +44,7 @@ pub use driver::Driver;
 pub use error::DriverError;
 pub use line::{Line, Untaken};
 pub use slots::SlotMap;
-pub use statistics::Snapshot;
+pub use statistics::{LineEnd, Snapshot};
 pub use status::Code;
 pub use supervise::panic_text;
 pub use tick::Exchange;

@@ -44,33 +44,60 @@ impl ProgramCounters {
     }
 }
 
-/// The settings that a line has at present and others look at: the kind of bus, and the watchdog of the ticks.
+/// The settings that a line has at present, which others look at.
 #[derive(Clone, Debug)]
-pub(super) struct BusFacts(Arc<Mutex<(&'static str, Option<Nanos>)>>);
+pub(super) struct BusFacts(Arc<Mutex<Facts>>);
+
+#[derive(Clone, Debug)]
+pub(super) struct Facts {
+    /// The kind of bus.
+    pub(super) kind: &'static str,
+    pub(super) end: Option<LineEnd>,
+    /// The host and port where the line connects or listens.
+    pub(super) address: Option<String>,
+    /// The watchdog of the ticks.
+    pub(super) watchdog: Option<Nanos>,
+}
+
+/// The end of a connection that a line is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LineEnd {
+    /// The peer connects.
+    Server,
+    /// The line connects.
+    Client,
+}
 
 impl BusFacts {
     pub(super) fn of(config: &Config) -> Self {
-        Self(Arc::new(Mutex::new(Self::facts(config))))
+        Self(Arc::new(Mutex::new(Facts::of(config))))
     }
 
     pub(super) fn set(&self, config: &Config) {
-        *self.lock() = Self::facts(config);
+        *self.lock() = Facts::of(config);
     }
 
-    fn facts(config: &Config) -> (&'static str, Option<Nanos>) {
-        (config.bus.kind(), config.timing.watchdog)
+    pub(super) fn get(&self) -> Facts {
+        self.lock().clone()
     }
 
-    pub(super) fn kind(&self) -> &'static str {
-        self.lock().0
-    }
-
-    pub(super) fn watchdog(&self) -> Option<Nanos> {
-        self.lock().1
-    }
-
-    fn lock(&self) -> MutexGuard<'_, (&'static str, Option<Nanos>)> {
+    fn lock(&self) -> MutexGuard<'_, Facts> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Facts {
+    fn of(config: &Config) -> Self {
+        let bus = &config.bus;
+        let is_server = bus.complaints().is_some();
+        let server = is_server.then_some(LineEnd::Server);
+        let client = bus.connects().then_some(LineEnd::Client);
+        Self {
+            kind: bus.kind(),
+            end: server.or(client),
+            address: bus.address(),
+            watchdog: config.timing.watchdog,
+        }
     }
 }
 

@@ -14,7 +14,7 @@ use tickbus_image::signal::{Area, Slot};
 use tickbus_record::{History, Recorder};
 
 use super::SlotMap;
-use super::statistics::{Figures, TickFigures};
+use super::statistics::{Figures, LineEnd, TickFigures};
 use super::tap::{Handle, Tap, tap};
 use super::tick_counters::TickTimes;
 use super::view::View;
@@ -95,12 +95,23 @@ impl Watch {
 
     /// Returns the kind of bus that the line has at present.
     pub fn bus_kind(&self) -> &'static str {
-        self.figures.bus.kind()
+        self.figures.bus.get().kind
+    }
+
+    /// Returns which end of its connection the line is at present; `None` for a bus without connections.
+    pub fn line_end(&self) -> Option<LineEnd> {
+        self.figures.bus.get().end
+    }
+
+    /// Returns the host and port where the line connects or listens at present, as configured; `None` for a bus without
+    /// one.
+    pub fn address(&self) -> Option<String> {
+        self.figures.bus.get().address
     }
 
     /// Returns how long the ticks can pause at present before the peer gets fail-safe values; `None` for any time.
     pub fn watchdog(&self) -> Option<Nanos> {
-        self.figures.bus.watchdog()
+        self.figures.bus.get().watchdog
     }
 
     /// Returns the area that this end writes.
@@ -171,9 +182,9 @@ impl Watch {
         self.figures.status.events()
     }
 
-    /// Returns true if the line has ever come up.
+    /// Returns true if the line has come up with its present settings.
     pub fn has_run(&self) -> bool {
-        self.figures.status.runs() > 0
+        self.figures.status.has_run()
     }
 
     /// Returns when the bus is tried again after a failure; `None` if it does not wait for that.

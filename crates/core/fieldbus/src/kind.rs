@@ -201,6 +201,11 @@ pub trait BusOptions: AnyOptions {
         false
     }
 
+    /// True if this end opens the connection, to whatever peer.
+    fn connects(&self) -> bool {
+        self.is_client()
+    }
+
     /// The host and port where this end connects or listens; `None` for a bus without one.
     fn address(&self) -> Option<String> {
         None

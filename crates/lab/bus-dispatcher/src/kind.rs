@@ -59,6 +59,14 @@ impl BusOptions for Options {
         Some(CYCLE)
     }
 
+    fn connects(&self) -> bool {
+        true
+    }
+
+    fn address(&self) -> Option<String> {
+        Some(self.address.to_string())
+    }
+
     fn set_address(&mut self, address: &str) -> Option<Result<(), Mistake>> {
         Some(self.set_address(address))
     }

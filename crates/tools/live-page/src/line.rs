@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use tickbus_base::statistics::{Statistics, Value};
 use tickbus_base::time::Nanos;
-use tickbus_driver::{StationView, Watch};
+use tickbus_driver::{LineEnd, StationView, Watch};
 use tickbus_fieldbus::{Cause, Link, LinkState, is_stale};
 
 use crate::events::{self, Event, whole_millis};
@@ -57,7 +57,7 @@ pub(crate) struct Line<'a> {
     /// The host and port where it connects or listens.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) address: Option<String>,
-    /// True if the line has ever come up.
+    /// True if the line has come up with its present settings.
     pub(crate) has_run: bool,
     /// The time until the bus is tried again after a failure.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -213,7 +213,10 @@ pub(crate) fn json(
         tick,
         silence_ms: (silence != Nanos::MAX).then_some(silence.0 / 1_000_000),
         stations,
-        end: end_of(watch),
+        end: watch.line_end().map(|end| match end {
+            LineEnd::Server => "server",
+            LineEnd::Client => "client",
+        }),
         address: address_of(watch, statistics),
         has_run: watch.has_run(),
         next_ms: watch.next_attempt().map(|next| whole_millis(next - now)),
@@ -236,27 +239,13 @@ pub(crate) fn json(
     line.text()
 }
 
-/// Which end of its connection the line is. After a change of the kind of bus that is not known.
-fn end_of(watch: &Watch) -> Option<&'static str> {
-    let bus = &watch.config().bus;
-    if bus.kind() != watch.bus_kind() {
-        return None;
-    }
-    if bus.complaints().is_some() {
-        return Some("server");
-    }
-    bus.is_client().then_some("client")
-}
-
 /// Where the line connects or listens: as the bus tells it, with the port that the system chose, or as configured.
 fn address_of(watch: &Watch, statistics: &Statistics) -> Option<String> {
     let told = statistics.iter().find(|(key, _)| *key == "address");
     if let Some((_, Value::Text(address))) = told {
         return Some(address.clone());
     }
-    let bus = &watch.config().bus;
-    let is_same = bus.kind() == watch.bus_kind();
-    bus.address().filter(|_| is_same)
+    watch.address()
 }
 
 /// Sorts statistics into counters, distributions and texts.

@@ -100,7 +100,8 @@ const outage = (() => {
   /** The time of something that happened `ago` milliseconds before the line was told. */
   function clock(own, ago) {
     const { driver, line } = own;
-    if (line.isPast) return words.moment(driver.moment.ms - ago);
+    // A line opens before the first tick.
+    if (line.isPast) return words.moment(Math.max(0, driver.moment.ms - ago));
     // To the second, so that the same moment always has the same text.
     return new Date(own.heard - ago).toLocaleTimeString("en-GB");
   }

@@ -29,6 +29,8 @@ pub struct LineEvent {
 pub(super) struct Journal {
     events: VecDeque<LineEvent>,
     next_attempt: Option<Nanos>,
+    /// How often the line had come up before it took its present settings.
+    runs_before: u64,
 }
 
 impl Journal {
@@ -84,6 +86,13 @@ impl LinkStatus {
     pub fn note_other_settings(&self, now: Nanos) {
         let mut record = self.lock();
         record.journal.note(now, None, "other settings");
+        record.journal.runs_before = record.entered[LinkState::Running as usize];
+    }
+
+    /// Returns true if the line has come up with its present settings.
+    pub fn has_run(&self) -> bool {
+        let record = self.lock();
+        record.entered[LinkState::Running as usize] > record.journal.runs_before
     }
 
     /// Returns the last events of the line, the oldest first.
@@ -111,7 +120,9 @@ mod tests {
             status.failed(now, Cause::Link, "refused", now + at(5));
             assert_eq!(status.next_attempt(), Some(now + at(5)));
         }
+        assert!(status.has_run());
         status.note_other_settings(at(400));
+        assert!(!status.has_run(), "another PLC is meant");
         let events = status.events();
         let states: Vec<_> = events.iter().map(|event| event.entered).collect();
         let failed = Some((LinkState::Failed, Cause::Link));

@@ -36,8 +36,8 @@ pub(crate) struct Facts {
     pub(crate) table: SignalTable,
     /// The area that this end reads, whose values can be stale; without one, every value can be.
     pub(crate) reads: Option<Area>,
-    /// True if stale values are fail-safe ones.
-    pub(crate) is_fail_safe: bool,
+    /// Per station, true if its stale values are fail-safe ones; false for others.
+    pub(crate) fail_safe: Vec<bool>,
     /// Some samples, and not every tick.
     pub(crate) is_sampled: bool,
     /// True if values have raw bits.
@@ -393,12 +393,10 @@ impl Archive {
             let flags = if is_forced {
                 FORCED
             } else if can_be_stale && !(0..2).contains(status) {
-                STALE
-                    | if self.facts.is_fail_safe {
-                        FAIL_SAFE
-                    } else {
-                        0
-                    }
+                match self.facts.fail_safe.get(signal.station) {
+                    Some(true) => STALE | FAIL_SAFE,
+                    _ => STALE,
+                }
             } else {
                 0
             };

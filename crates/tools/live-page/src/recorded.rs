@@ -83,7 +83,7 @@ impl Recorded {
                 ..SignalTable::default()
             },
             reads: reads(&role),
-            is_fail_safe: false,
+            fail_safe: Vec::new(),
             is_sampled: false,
             has_bits: false,
         };

@@ -36,7 +36,7 @@ fn archive_within(limit: usize, ticks: u64) -> Archive {
     let facts = Facts {
         table,
         reads: Some(Area::Input),
-        is_fail_safe: false,
+        fail_safe: vec![true],
         is_sampled: false,
         has_bits: true,
     };
@@ -386,4 +386,20 @@ fn edges_that_the_history_lacks_are_unknown() {
     let archive = archive();
     let change = &state(&archive, 5)["values"][0];
     assert_eq!(change.get(3), None, "{change}");
+}
+
+#[test]
+fn a_stale_value_is_marked_as_its_station_says() {
+    let mut archive = archive();
+    archive.facts.reads = Some(Area::Output);
+    archive.history.push(&Tick {
+        number: 21,
+        time: Nanos::from_millis(21),
+        status: 2,
+        ..Tick::new(archive.history.columns())
+    });
+    let flags = |archive: &Archive| state(archive, 21)["values"][0][4].as_u64();
+    assert_eq!(flags(&archive), Some(u64::from(STALE | FAIL_SAFE)));
+    archive.facts.fail_safe = vec![false];
+    assert_eq!(flags(&archive), Some(u64::from(STALE)));
 }

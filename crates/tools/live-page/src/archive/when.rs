@@ -298,7 +298,7 @@ mod tests {
                 ..SignalTable::default()
             },
             reads: Some(Area::Input),
-            is_fail_safe: false,
+            fail_safe: Vec::new(),
             is_sampled: false,
             has_bits: false,
         };

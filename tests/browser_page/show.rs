@@ -141,6 +141,12 @@ fn a_recording_of_nanoseconds_has_an_axis_and_edges() {
     let view = browser.run("const { begin, end } = analyser.view; return [begin, end]");
     let nanos = |at: usize| (view[at].as_f64().expect("a time") * 1e6).round();
     assert_eq!([nanos(0), nanos(1)], [0.0, 20.0], "all of it");
+    // The second cursor at the last tick has a value, too.
+    browser.run("document.getElementById('cursor-2').click()");
+    browser.wait(
+        "analyser.second.tick === 21 && analyser.tracks[0].parts.then.textContent === 'FALSE'",
+    );
+    browser.run("document.getElementById('drop-cursor').click()");
     for at in [19, 18, 17] {
         browser.run("analyser.toEdge(-1)");
         moment(&format!(

@@ -73,7 +73,12 @@ impl Condition {
             }
             _ => {}
         }
-        let around = text.split_once('±').or_else(|| text.split_once("+-"));
+        // A name may contain the signs.
+        let number = text.rfind(['<', '>', '=']).map_or(text.len(), |at| at + 1);
+        let around = ["±", "+-"].iter().find_map(|sign| {
+            let at = number + text[number..].find(sign)?;
+            Some((&text[..at], &text[at + sign.len()..]))
+        });
         if let Some((comparison, tolerance)) = around {
             return near(comparison, tolerance, table);
         }
@@ -182,7 +187,7 @@ fn bit(signal: usize, demand: Demand, table: &SignalTable) -> Result<Condition, 
 /// `NAME == 120 ± 0.5`, cut at its sign.
 fn near(comparison: &str, tolerance: &str, table: &SignalTable) -> Result<Condition, Mistake> {
     let condition = Condition::compares(comparison.trim(), table)?;
-    let Some((_, number)) = comparison.split_once("==") else {
+    let Some((_, number)) = comparison.rsplit_once("==") else {
         return Err(Mistake::new(
             "a tolerance stands at a sign other than ==",
             "write == for it, or leave the tolerance out",
@@ -226,7 +231,9 @@ mod tests {
             unit: Some("mm".to_owned()),
             ..Signal::new("Height", Area::Output, 2, DataType::Int)
         };
-        SignalTable::of_one_station(1, 4, vec![on("Not OK", 0), on("Level >= 3", 1), height])
+        let pos = Signal::new("Pos +- 5", Area::Output, 4, DataType::Int);
+        let signals = vec![on("Not OK", 0), on("Level >= 3", 1), height, pos];
+        SignalTable::of_one_station(1, 6, signals)
     }
 
     #[test]
@@ -249,6 +256,8 @@ mod tests {
             ("Height == 7", 2, "7"),
             ("Height == 120 ± 0.5", 2, "120 ± 0.5"),
             ("Height == 120 +- 0.5", 2, "120 ± 0.5"),
+            ("Pos +- 5 > 3", 3, "> 3"),
+            ("Pos +- 5 == 3 ± 0.5", 3, "3 ± 0.5"),
         ] {
             let read = Condition::parse(text, &table).expect(text);
             assert_eq!(
@@ -281,7 +290,7 @@ mod tests {
             ),
             (
                 "",
-                "no signal is named; signals are Not OK, Level >= 3, Height",
+                "no signal is named; signals are Not OK, Level >= 3, Height, Pos +- 5",
             ),
             (
                 "not Height",

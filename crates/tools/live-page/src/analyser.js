@@ -472,8 +472,8 @@ const analyser = (() => {
 
   /** The value at a time, as far as it is known. */
   function valueAt({ signal, times, values, from, until }, ms) {
-    const time = ms + bar.offset(signal.driver) + TINY;
-    return time < from || time > until ? undefined : valueOf({ values }, indexAt(times, time));
+    const time = ms + bar.offset(signal.driver);
+    return time + TINY < from || time - TINY > until ? undefined : valueOf({ values }, indexAt(times, time + TINY));
   }
 
   /** Writes what the cursors read. */

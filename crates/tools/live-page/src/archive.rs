@@ -17,11 +17,15 @@ use crate::sheet::{ChangeJson, FAIL_SAFE, FORCED, Row, STALE};
 
 mod forces;
 mod jump;
+mod marks;
 mod moments;
 mod when;
 
 /// The most faults and states of the line that are remembered.
 const MOST: usize = 10_000;
+
+/// The most turns of the faults of a recording that are remembered.
+const MOST_TURNS: usize = 100_000;
 
 /// The beginning of the name of the fault that forces a signal.
 const FORCE: &str = "forced: ";
@@ -32,8 +36,8 @@ pub(crate) struct Facts {
     pub(crate) table: SignalTable,
     /// The area that this end reads, whose values can be stale; without one, every value can be.
     pub(crate) reads: Option<Area>,
-    /// True if stale values are fail-safe ones.
-    pub(crate) is_fail_safe: bool,
+    /// Per station, true if its stale values are fail-safe ones; false for others.
+    pub(crate) fail_safe: Vec<bool>,
     /// Some samples, and not every tick.
     pub(crate) is_sampled: bool,
     /// True if values have raw bits.
@@ -77,7 +81,7 @@ struct Seen {
 struct Mark {
     /// The number of the tick in the history.
     tick: u64,
-    /// The time of the tick, once it was asked for.
+    /// The time of the tick; `None` until the history has the tick, and if that had left the memory by then.
     at: Option<Nanos>,
     force: Option<Force>,
     name: String,
@@ -111,14 +115,6 @@ pub(crate) fn time(text: &str) -> Option<Nanos> {
     Some(Nanos(nanos))
 }
 
-/// Adds an item, and drops the oldest one if there are too many.
-fn push<T>(list: &mut VecDeque<T>, item: T) {
-    if list.len() == MOST {
-        list.pop_front();
-    }
-    list.push_back(item);
-}
-
 impl Archive {
     pub(crate) fn new(history: Arc<History>, facts: Facts) -> Self {
         let signals = facts.table.signals.iter();
@@ -146,11 +142,7 @@ impl Archive {
     /// Notes that the fault with this number forces a signal. The history has what the simulation itself
     /// wrote meanwhile, and the PLC got this.
     pub(crate) fn note_force(&self, fault: u32, force: Force) {
-        let forces = &mut self.notes().forces;
-        forces.insert(fault, force);
-        if forces.len() > MOST {
-            forces.pop_first();
-        }
+        self.notes().forces.insert(fault, force);
     }
 
     /// Notes the faults that have begun or ended, as known after the history had the tick `known`. Their ticks count
@@ -224,13 +216,17 @@ impl Archive {
                 ..mark.clone()
             });
             for mark in begin.into_iter().chain([mark]) {
-                push(marks, mark);
+                marks::keep(marks, mark, MOST);
             }
         }
-        if seen.len() > MOST {
-            seen.drain(..MOST / 2);
-        }
+        // What is no longer on the list is over.
+        let is_listed = |id: u32| faults.iter().any(|fault| fault.id == id);
+        let newest = faults.iter().map(|fault| fault.id).max().unwrap_or(0);
+        seen.retain(|known| is_listed(known.id));
+        forces.retain(|id, _| *id > newest || is_listed(*id));
         notes.known = Some(known);
+        drop(notes);
+        self.time_marks();
     }
 
     /// The tick of the history in which a force that is over and lasted for a given time began.
@@ -273,7 +269,7 @@ impl Archive {
             text: name.to_owned(),
             begins,
         };
-        push(&mut self.notes().marks, mark);
+        marks::keep(&mut self.notes().marks, mark, MOST_TURNS);
     }
 
     /// The rows of the last tick.
@@ -303,7 +299,10 @@ impl Archive {
             cause,
             reason: link.reason.clone(),
         };
-        push(lines, line);
+        if lines.len() == MOST {
+            lines.pop_front();
+        }
+        lines.push_back(line);
     }
 
     /// How far it reaches, for every event.
@@ -326,7 +325,7 @@ impl Archive {
             .iter()
             .map(|(begin, end)| (millis(*begin), end.map(millis)))
             .collect();
-        let marks = self.marks_within(span);
+        let marks = self.marks_of(span);
         let marks: Vec<_> = marks
             .iter()
             .filter_map(|mark| {
@@ -350,67 +349,15 @@ impl Archive {
         .to_string()
     }
 
-    /// The marks of the ticks that the history has, with their times.
-    fn marks_within(&self, span: Option<Span>) -> Vec<Mark> {
-        let Some(Span { first, last, .. }) = span else {
-            return Vec::new();
-        };
-        let is_kept = |mark: &Mark| (first.0..=last.0).contains(&mark.tick);
-        let mut marks = self.timed_marks();
-        marks.retain(is_kept);
-        marks
-    }
-
-    /// All marks, with their times as far as the history has them.
-    fn timed_marks(&self) -> Vec<Mark> {
-        self.last_marks(usize::MAX, |_| true)
-    }
-
-    /// The last `most` of the marks that are wanted, with their times as far as the history has them.
-    fn last_marks(&self, most: usize, is_wanted: impl Fn(&Mark) -> bool) -> Vec<Mark> {
-        let Some(Span { last, .. }) = self.history.span() else {
-            return Vec::new();
-        };
-        let mut marks: Vec<Mark> = {
-            let notes = self.notes();
-            let wanted = notes.marks.iter().rev().filter(|mark| is_wanted(mark));
-            wanted.take(most).cloned().collect()
-        };
-        marks.reverse();
-        // Each time is looked for once, without the lock, since that decodes a part of the history.
-        let mut found = BTreeMap::new();
-        for mark in marks
-            .iter_mut()
-            .filter(|mark| mark.at.is_none() && mark.tick <= last.0)
-        {
-            let find = || self.history.at(Moment::Tick(mark.tick)).map(|it| it.time);
-            mark.at = *found.entry(mark.tick).or_insert_with(find);
-        }
-        if !found.is_empty() {
-            for mark in &mut self.notes().marks {
-                mark.at = mark.at.or_else(|| *found.get(&mark.tick)?);
-            }
-        }
-        marks
-    }
-
-    /// The faults that are on at a tick.
-    fn faults_at(&self, tick: u64) -> Vec<Mark> {
-        let notes = self.notes();
-        let mut on: Vec<Mark> = Vec::new();
-        for mark in notes.marks.iter().filter(|mark| mark.tick <= tick) {
-            on.retain(|other| other.name != mark.name || other.text != mark.text);
-            if mark.begins {
-                on.push(mark.clone());
-            }
-        }
-        on
-    }
-
     /// True for a signal that this end writes.
     fn is_written(&self, signal: usize) -> bool {
         let area = self.facts.table.signals[signal].area;
         self.facts.reads.is_some_and(|reads| reads != area)
+    }
+
+    /// True if the history has the edges of a signal: those of latched signals that this end reads.
+    pub(crate) fn has_edges(&self, signal: usize) -> bool {
+        self.edges[signal].is_some()
     }
 
     /// The column of a signal in the history, and the station whose stale data have no value.
@@ -428,8 +375,10 @@ impl Archive {
         let mut values = tick.values.clone();
         for mark in faults {
             if let Some(force) = mark.force.filter(|force| self.is_written(force.signal)) {
-                let since = self.time_of(mark).unwrap_or(tick.time);
-                self.apply(force, since, tick.time, &mut values);
+                let passed = tick.time - mark.since();
+                if let Some(value) = self.forced(force, passed) {
+                    values[force.signal] = value;
+                }
             }
         }
         if self.facts.has_bits {
@@ -444,12 +393,10 @@ impl Archive {
             let flags = if is_forced {
                 FORCED
             } else if can_be_stale && !(0..2).contains(status) {
-                STALE
-                    | if self.facts.is_fail_safe {
-                        FAIL_SAFE
-                    } else {
-                        0
-                    }
+                match self.facts.fail_safe.get(signal.station) {
+                    Some(true) => STALE | FAIL_SAFE,
+                    _ => STALE,
+                }
             } else {
                 0
             };
@@ -497,6 +444,9 @@ impl Archive {
                 let mut change = row.json(index, &signals[index]);
                 if !self.facts.has_bits {
                     change.raw = None;
+                }
+                if !self.has_edges(index) {
+                    change.edges = None;
                 }
                 change
             })

@@ -249,7 +249,7 @@ const list = (() => {
       text(element, "pin", isPinned ? "★" : "☆");
       flag(element, "pinned", isPinned);
       set(element, "pin-label", `${isPinned ? "Unpin" : "Pin"} ${signal.name}`, (it, label) => { it.parts.pin.setAttribute("aria-label", label); it.parts.pin.title = label; });
-      text(element, "edges", signal.latch ? words.whole(signal.edges) : swallowed(signal));
+      text(element, "edges", !signal.latch ? swallowed(signal) : signal.edges === null ? "–" : words.whole(signal.edges));
       text(element, "age", words.span(plant.age(signal)));
       text(element, "mark", signal.isForced ? "forced" : signal.isFailSafe ? "fail-safe" : signal.isStale ? "stale" : "");
       text(element, "open", signal.isOpen ? "▾" : "▸");

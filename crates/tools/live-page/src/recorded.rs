@@ -83,7 +83,7 @@ impl Recorded {
                 ..SignalTable::default()
             },
             reads: reads(&role),
-            is_fail_safe: false,
+            fail_safe: Vec::new(),
             is_sampled: false,
             has_bits: false,
         };
@@ -391,7 +391,7 @@ impl Exhibit for ShownRecording {
     fn json(&self) -> String {
         let columns = &self.recorded.archive.history.columns().columns;
         let rows = self.signals().iter().zip(&self.sheet.rows).zip(columns);
-        let signals = rows.map(|((signal, row), column)| {
+        let signals = rows.enumerate().map(|(index, ((signal, row), column))| {
             let has_place = column.address.is_some();
             SignalJson {
                 name: &signal.name,
@@ -419,7 +419,7 @@ impl Exhibit for ShownRecording {
                 writable: false,
                 value: row.value(signal),
                 raw: String::new(),
-                edges: signal.latch.map(|_| row.edges),
+                edges: self.recorded.archive.has_edges(index).then_some(row.edges),
                 age_ms: None,
                 failsafe: false,
                 stale: row.flags & STALE != 0,

@@ -173,7 +173,7 @@ impl ShownRun {
                 ..SignalTable::default()
             },
             reads: None,
-            is_fail_safe: false,
+            fail_safe: Vec::new(),
             is_sampled: true,
             has_bits: false,
         };

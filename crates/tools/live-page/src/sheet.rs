@@ -97,7 +97,7 @@ pub(crate) struct ChangeJson {
     index: usize,
     value: Number,
     pub(crate) raw: Option<String>,
-    edges: Option<u32>,
+    pub(crate) edges: Option<u32>,
     flags: u8,
 }
 

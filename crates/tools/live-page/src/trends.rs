@@ -74,7 +74,8 @@ pub(crate) fn document(archive: &Archive, path: &str) -> Option<String> {
     if indices.len() > MOST_TRENDS || indices.iter().any(|index| *index >= signals.len()) {
         return None;
     }
-    let until = to.min(last);
+    let until = archive.known_until(to.min(last));
+    let to = until.max(from);
     let known = (from.max(first), until);
     let share = (MOST_IN_ALL / indices.len().max(1)).clamp(LEAST_POINTS, MOST_POINTS);
     let most = asked.min(share);
@@ -188,18 +189,20 @@ impl Points {
     /// Keeps the first, least, greatest and last value of the last span, and the first unknown one.
     fn thin(&mut self) {
         let group = &self.kept[self.begin..];
-        let by = |a: &&(Nanos, f64), b: &&(Nanos, f64)| a.1.total_cmp(&b.1);
-        let known = || group.iter().filter(|(_, value)| !value.is_nan());
-        let ends = [
-            group.first(),
+        let by = |a: &usize, b: &usize| group[*a].1.total_cmp(&group[*b].1);
+        let known = || (0..group.len()).filter(|place| !group[*place].1.is_nan());
+        // Several can have the same time.
+        let places: BTreeSet<usize> = [
+            (!group.is_empty()).then_some(0),
             known().min_by(by),
             known().max_by(by),
-            group.iter().find(|(_, value)| value.is_nan()),
-            group.last(),
-        ];
-        let mut ends: Vec<_> = ends.into_iter().flatten().copied().collect();
-        ends.sort_by_key(|(at, _)| *at);
-        ends.dedup_by_key(|(at, _)| *at);
+            group.iter().position(|(_, value)| value.is_nan()),
+            group.len().checked_sub(1),
+        ]
+        .into_iter()
+        .flatten()
+        .collect();
+        let mut ends: Vec<_> = places.into_iter().map(|place| group[place]).collect();
         self.kept.truncate(self.begin);
         self.kept.append(&mut ends);
     }
@@ -281,6 +284,18 @@ mod tests {
         let at = at.expect("the peak is there");
         assert_eq!(trend.values[at + 1].to_bits(), (-9.0_f64).to_bits());
         assert!(trend.values[at - 3..at].iter().any(|value| value.is_nan()));
+    }
+
+    #[test]
+    fn changes_in_the_same_nanosecond_stay_apart() {
+        let mut points = Points::new((Nanos::ZERO, Nanos(1_000)), 5_000);
+        for change in 0..10_000 {
+            points.push(Nanos(change / 10), f64::from(u8::from(change % 2 == 1)));
+        }
+        let trend = points.trend();
+        assert!(trend.is_thin && trend.ms.is_sorted());
+        let edges = trend.values.windows(2).filter(|pair| pair[0] < pair[1]);
+        assert!(edges.count() >= 1_000, "{:?}", trend.values);
     }
 
     #[test]

@@ -18,44 +18,23 @@ impl Archive {
         self.is_written(signal) && self.notes().marks.iter().any(is_of)
     }
 
-    /// The time of the tick in which a fault began, as far as the history has it.
-    pub(super) fn time_of(&self, mark: &Mark) -> Option<Nanos> {
-        let find = || {
-            self.history
-                .at(Moment::Tick(mark.tick))
-                .map(|tick| tick.time)
-        };
-        mark.at.or_else(find)
+    /// The end of the time up to `to` in which all forces are known.
+    pub(crate) fn known_until(&self, to: Nanos) -> Nanos {
+        let known = self.notes().known;
+        let known = known.and_then(|known| self.history.at(Moment::Tick(known)));
+        known.map_or(to, |known| to.min(known.time))
     }
 
-    /// The value of a signal that is forced since a time, at another time; `own` is the value without the force when it
-    /// began.
-    pub(super) fn forced(&self, force: Force, own: Option<Slot>, passed: Nanos) -> Option<Slot> {
+    /// The value of a signal that has been forced for some time.
+    pub(super) fn forced(&self, force: Force, passed: Nanos) -> Option<Slot> {
         match force.effect {
             SignalEffect::Stuck(value) => value,
             SignalEffect::Ramp { to, within, .. } if passed >= within => Some(to),
             SignalEffect::Ramp { from, to, within } => {
                 let signal = &self.facts.table.signals[force.signal];
-                Some(between(signal, (from.or(own)?, to), (passed, within)))
+                Some(between(signal, (from?, to), (passed, within)))
             }
             _ => None,
-        }
-    }
-
-    /// Puts the value of a signal that is forced since a time into the values of a tick.
-    pub(super) fn apply(&self, force: Force, since: Nanos, now: Nanos, values: &mut [Slot]) {
-        // Without the first value, the tick's own one is nearest to it.
-        let begun = || {
-            self.history
-                .at(Moment::Time(since))
-                .map(|it| it.values[force.signal])
-        };
-        let own = match force.effect {
-            SignalEffect::Ramp { from: None, .. } => begun().unwrap_or(values[force.signal]),
-            _ => values[force.signal],
-        };
-        if let Some(value) = self.forced(force, Some(own), now - since) {
-            values[force.signal] = value;
         }
     }
 
@@ -71,29 +50,22 @@ impl Archive {
         let Some(begin) = begin.filter(|_| self.has_forces(signal)) else {
             return points;
         };
-        let is_of = |mark: &Mark| mark.force.is_some_and(|force| force.signal == signal);
+        let last = self.last();
+        let is_of = |mark: &Mark| {
+            mark.tick <= last && mark.force.is_some_and(|force| force.signal == signal)
+        };
         // The forces in their order; the second of two at the same time counts.
         let mut turns: Vec<(Nanos, Option<Slot>)> = Vec::new();
         let mut on: Option<String> = None;
-        for mark in self.timed_marks().into_iter().filter(is_of) {
-            let (Some(at), Some(force)) = (mark.at, mark.force) else {
-                continue;
-            };
+        for mark in self.last_marks(usize::MAX, is_of) {
+            let Some(force) = mark.force else { continue };
+            let at = mark.since();
             // A ramp that is replaced or released on its way.
             while turns.last().is_some_and(|(last, _)| *last > at) {
                 turns.pop();
             }
             if mark.begins {
                 on = Some(mark.text);
-                let own = points.iter().rev().find(|(time, _)| *time <= at);
-                let own = own.and_then(|(_, value)| *value).or_else(|| {
-                    // The ramp began before the first of these points.
-                    let is_open = matches!(force.effect, SignalEffect::Ramp { from: None, .. });
-                    let tick = is_open
-                        .then(|| self.history.at(Moment::Time(at)))
-                        .flatten()?;
-                    Some(tick.values[signal])
-                });
                 let (steps, length) = match force.effect {
                     SignalEffect::Ramp { within, .. } => (STEPS, within),
                     _ => (0, Nanos::ZERO),
@@ -101,7 +73,7 @@ impl Archive {
                 for step in 0..=steps {
                     let passed = Nanos(length.0 / STEPS * step);
                     let passed = if step == STEPS { length } else { passed };
-                    turns.push((at + passed, self.forced(force, own, passed)));
+                    turns.push((at + passed, self.forced(force, passed)));
                 }
             } else if on.as_ref() == Some(&mark.text) {
                 on = None;

@@ -1,7 +1,8 @@
 //! The next and the last tick that has what was asked for.
 
 use serde_json::json;
-use tickbus_record::{Goal, Moment};
+use tickbus_record::Goal;
+use tickbus_reply::{Condition, Demand};
 
 use super::{Archive, Mark, millis};
 
@@ -11,26 +12,31 @@ impl Archive {
         let found = match what {
             "outage" => self.history.search(from, is_forward, Goal::Outage),
             "fault" => {
-                let marks = self.notes().marks.clone();
-                let aside = |mark: &&Mark| {
-                    mark.begins && mark.tick != from && (mark.tick > from) == is_forward
+                let first = self.history.span().map_or(0, |span| span.first.0);
+                let is_wanted = |mark: &Mark| {
+                    let is_aside = mark.tick != from && (mark.tick > from) == is_forward;
+                    mark.begins && is_aside && mark.tick >= first
                 };
-                let mut ticks: Vec<u64> =
-                    marks.iter().filter(aside).map(|mark| mark.tick).collect();
-                ticks.sort_unstable();
-                let tick = if is_forward {
-                    ticks.first()
+                let marks = self.last_marks(usize::MAX, is_wanted);
+                let places = marks.iter().filter_map(|mark| Some((mark.tick, mark.at?)));
+                if is_forward {
+                    places.min()
                 } else {
-                    ticks.last()
-                };
-                let tick = tick.and_then(|tick| self.history.at(Moment::Tick(*tick)));
-                tick.map(|tick| (tick.number, tick.time))
-                    .filter(|(number, _)| *number != from && (*number > from) == is_forward)
+                    places.max()
+                }
             }
             index => {
                 let index = index.parse().ok()?;
                 self.facts.table.signals.get(index)?;
-                self.history.search(from, is_forward, Goal::Change(index))
+                if self.has_forces(index) {
+                    let changes = Condition {
+                        signal: index,
+                        demand: Demand::Changes,
+                    };
+                    self.search(vec![changes], is_forward, from).at
+                } else {
+                    self.history.search(from, is_forward, Goal::Change(index))
+                }
             }
         };
         let found = found.map(|(tick, time)| json!({ "tick": tick, "ms": millis(time) }));

@@ -1,17 +1,28 @@
 //! The marks of faults.
 
-use tickbus_image::signal::{DataType, Signal, Slot};
+use std::ops::RangeInclusive;
+
+use tickbus_image::signal::{DataType, Latch, Signal, Slot};
 use tickbus_record::{Column, Columns};
 
 use super::*;
 use crate::forcing::Way;
+use crate::trends;
 use tickbus_fieldbus::Cause;
 use tickbus_record::TrendPoint;
 
 /// An archive of twenty ticks, one each millisecond, with one signal.
 fn archive() -> Archive {
+    archive_within(1 << 20, 20)
+}
+
+/// The same of so many ticks, in so much memory.
+fn archive_within(limit: usize, ticks: u64) -> Archive {
     let table = SignalTable {
-        signals: vec![Signal::new("a", Area::Output, 0, DataType::Byte)],
+        signals: vec![Signal {
+            latch: Some(Latch::Rising),
+            ..Signal::new("a", Area::Output, 0, DataType::Byte)
+        }],
         ..SignalTable::default()
     };
     let columns = Columns {
@@ -20,23 +31,45 @@ fn archive() -> Archive {
         stations: Vec::new(),
         columns: vec![Column::plain("a".to_owned(), DataType::Byte, String::new())],
     };
-    let history = History::new(columns.clone(), 1 << 20);
-    for number in 1..=20 {
-        let time = Nanos::from_millis(i64::try_from(number).expect("few"));
-        history.push(&Tick {
-            number,
-            time,
-            ..Tick::new(&columns)
-        });
-    }
+    let history = History::new(columns, limit);
+    push_ticks(&history, 1..=ticks);
     let facts = Facts {
         table,
         reads: Some(Area::Input),
-        is_fail_safe: false,
+        fail_safe: vec![true],
         is_sampled: false,
         has_bits: true,
     };
     Archive::new(Arc::new(history), facts)
+}
+
+fn push_ticks(history: &History, numbers: RangeInclusive<u64>) {
+    for number in numbers {
+        let time = Nanos::from_millis(i64::try_from(number).expect("few"));
+        history.push(&Tick {
+            number,
+            time,
+            ..Tick::new(history.columns())
+        });
+    }
+}
+
+/// The state at a tick, or at the oldest one.
+fn state(archive: &Archive, tick: u64) -> serde_json::Value {
+    let state = archive.state(Moment::Tick(tick), None).expect("a tick");
+    serde_json::from_str(&state).expect("right")
+}
+
+/// The value at a tick.
+fn value(archive: &Archive, tick: u64) -> Option<f64> {
+    state(archive, tick)["values"][0][1].as_f64()
+}
+
+/// The tick to which a jump leads.
+fn jump(archive: &Archive, what: &str, is_forward: bool, from: u64) -> Option<u64> {
+    let found = archive.jump(what, is_forward, from).expect("known");
+    let found: serde_json::Value = serde_json::from_str(&found).expect("right");
+    found["tick"].as_u64()
 }
 
 fn forced(id: u32, phase: Phase, begun: u64, tick: u64) -> FaultStatus {
@@ -101,8 +134,7 @@ fn a_fault_that_is_over_before_the_page_looks_is_marked_and_found() {
     archive.note_faults(&[forced(1, Phase::Over, 1, 7)], 0, 20);
     archive.note_faults(&[forced(1, Phase::Over, 1, 7)], 0, 20);
     assert_eq!(marks(&archive), [(7, 7.0, true), (7, 7.0, false)]);
-    let found = archive.jump("fault", true, 1).expect("known");
-    assert!(found.contains("\"tick\":7"), "{found}");
+    assert_eq!(jump(&archive, "fault", true, 1), Some(7));
     assert!(archive.faults_at(7).is_empty());
 }
 
@@ -151,11 +183,7 @@ fn a_forced_value_takes_the_place_of_the_one_that_the_simulation_wrote() {
     assert_eq!(trend(0, 30), whole);
     assert_eq!(trend(5, 10), [(ms(5), five), (ms(8), six)]);
     assert_eq!(trend(15, 30), [(ms(15), first.1)]);
-    let value = |tick: u64| {
-        let state = archive.state(Moment::Tick(tick), None).expect("a tick");
-        let state: serde_json::Value = serde_json::from_str(&state).expect("right");
-        state["values"][0][1].as_f64()
-    };
+    let value = |tick: u64| value(&archive, tick);
     assert_eq!([2, 3, 8, 12].map(value), [0.0, 5.0, 6.0, 0.0].map(Some));
 }
 
@@ -180,11 +208,7 @@ fn a_ramp_goes_evenly_and_one_tick_is_one_tick_however_rarely_the_page_looks() {
     assert_eq!(points.len(), 101, "{points:?}");
     assert!(points.contains(&(8_000_000, 50.0)), "{points:?}");
     assert_eq!(points.last(), Some(&(13_000_000, 100.0)));
-    let value = |tick: u64| {
-        let state = archive.state(Moment::Tick(tick), None).expect("a tick");
-        let state: serde_json::Value = serde_json::from_str(&state).expect("right");
-        state["values"][0][1].as_f64()
-    };
+    let value = |tick: u64| value(&archive, tick);
     assert_eq!(
         [2, 3, 8, 13, 15].map(value),
         [0.0, 0.0, 50.0, 100.0, 100.0].map(Some)
@@ -256,4 +280,126 @@ fn a_moment_has_the_line_and_the_events_before_it() {
     // The simulation has not ticked since then, and the time continues.
     let later = archive.fault_events(Nanos::from_millis(1_500));
     assert_eq!(later[0].ago_ms, 1_508);
+}
+
+#[test]
+fn a_trend_ends_where_the_forces_are_known() {
+    let archive = archive();
+    let trend = |path: &str| -> serde_json::Value {
+        let trend = trends::document(&archive, path).expect("a trend");
+        serde_json::from_str(&trend).expect("right")
+    };
+    assert_eq!(trend("0/0/30")["to_ms"], 20.0);
+    archive.note_faults(&[], 0, 10);
+    assert_eq!(trend("0/0/30")["to_ms"], 10.0);
+    // It begins later.
+    assert_eq!(trend("0/12/30")["to_ms"], 10.0);
+    archive.note_force(1, Way::Once.force(0, Slot::from_real(7.0), None));
+    archive.note_faults(&[forced(1, Phase::Over, 1, 16)], 0, 20);
+    let rest = trend("0/10/30");
+    assert_eq!(rest["to_ms"], 20.0);
+    assert_eq!(rest["signals"]["0"]["ms"], json!([10.0, 15.0, 16.0]));
+}
+
+#[test]
+fn a_force_stays_known_however_many_faults_come_after_it() {
+    let archive = archive();
+    archive.note_force(1, Way::Hold.force(0, Slot::from_real(5.0), None));
+    let hold = forced(1, Phase::Active, 1, 3);
+    let most = u32::try_from(MOST).expect("few");
+    for id in 2..most + 2 {
+        archive.note_force(id, Way::Once.force(0, Slot::from_real(6.0), None));
+        let leak = FaultStatus {
+            name: "leak".to_owned(),
+            ..forced(id, Phase::Over, 1, 10)
+        };
+        archive.note_faults(&[hold.clone(), leak], 0, 20);
+    }
+    assert!(archive.notes().marks.len() <= MOST);
+    assert_eq!(archive.notes().forces.len(), 2);
+    assert_eq!(
+        [2, 3, 20].map(|tick| value(&archive, tick)),
+        [0.0, 5.0, 5.0].map(Some)
+    );
+    archive.note_faults(&[forced(1, Phase::Over, 1, 15)], 0, 20);
+    assert_eq!(
+        [14, 15].map(|tick| value(&archive, tick)),
+        [5.0, 0.0].map(Some)
+    );
+}
+
+#[test]
+fn a_recording_has_many_faults_and_its_bar_some_of_them() {
+    let archive = archive();
+    for pulse in 0..30_000 {
+        let tick = 1 + pulse * 19 / 30_000;
+        let at = Nanos::from_millis(i64::try_from(tick).expect("few"));
+        archive.note_turn((tick, at), "leak", true);
+        archive.note_turn((tick, at), "leak", false);
+    }
+    assert_eq!(jump(&archive, "fault", true, 0), Some(1));
+    let shown = marks(&archive);
+    assert!((19..=MOST).contains(&shown.len()), "{}", shown.len());
+    assert_eq!((shown[0].0, shown[shown.len() - 1].0), (1, 19));
+}
+
+#[test]
+fn a_ramp_goes_on_after_its_beginning_has_left_the_memory() {
+    let up = Way::Ramp(Nanos::from_millis(10)).force(0, Slot::from_real(100.0), None);
+    let ramp = forced(1, Phase::Active, 1, 3);
+    let looked_before = archive_within(8 << 10, 20);
+    let looked_after = archive_within(8 << 10, 20_000);
+    for (archive, known) in [(&looked_before, 20), (&looked_after, 20_000)] {
+        archive.note_force(1, up);
+        archive.note_faults(std::slice::from_ref(&ramp), 0, known);
+    }
+    push_ticks(&looked_before.history, 21..=20_000);
+    for archive in [&looked_before, &looked_after] {
+        let (first, begin) = archive.history.span().expect("ticks").first;
+        assert!(first > 1_000, "{first}");
+        assert_eq!(value(archive, 0), Some(100.0));
+        let own = archive
+            .history
+            .trend(0, None, (begin, Nanos::from_secs(20)));
+        let points = archive.with_forces(0, own, Nanos::from_secs(20));
+        assert_eq!(points, [(begin, Some(Slot::from_real(100.0)))]);
+        let found = archive.when("a%20%3C%2099", true, 0);
+        assert!(found.contains("\"tick\":null"), "{found}");
+        assert_eq!(jump(archive, "fault", false, 20_000), None);
+    }
+}
+
+#[test]
+fn a_jump_to_a_change_sees_what_is_forced() {
+    let archive = archive();
+    archive.note_force(1, Way::Hold.force(0, Slot::from_real(5.0), None));
+    archive.note_faults(&[forced(1, Phase::Active, 1, 8)], 0, 20);
+    archive.note_faults(&[forced(1, Phase::Over, 1, 12)], 0, 20);
+    let next = |from| jump(&archive, "0", true, from);
+    assert_eq!([3, 8, 12].map(next), [Some(8), Some(12), None]);
+    let last = |from| jump(&archive, "0", false, from);
+    assert_eq!([20, 12, 8].map(last), [Some(12), Some(8), None]);
+}
+
+#[test]
+fn edges_that_the_history_lacks_are_unknown() {
+    let archive = archive();
+    let change = &state(&archive, 5)["values"][0];
+    assert_eq!(change.get(3), None, "{change}");
+}
+
+#[test]
+fn a_stale_value_is_marked_as_its_station_says() {
+    let mut archive = archive();
+    archive.facts.reads = Some(Area::Output);
+    archive.history.push(&Tick {
+        number: 21,
+        time: Nanos::from_millis(21),
+        status: 2,
+        ..Tick::new(archive.history.columns())
+    });
+    let flags = |archive: &Archive| state(archive, 21)["values"][0][4].as_u64();
+    assert_eq!(flags(&archive), Some(u64::from(STALE | FAIL_SAFE)));
+    archive.facts.fail_safe = vec![false];
+    assert_eq!(flags(&archive), Some(u64::from(STALE)));
 }

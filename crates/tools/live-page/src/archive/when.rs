@@ -4,9 +4,7 @@ use serde_json::json;
 use tickbus_base::time::Nanos;
 use tickbus_base::{Mistake, percent_decoded};
 use tickbus_driver::Force;
-use tickbus_fieldbus::faults::SignalEffect;
 use tickbus_image::signal::{SignalTable, Slot};
-use tickbus_record::Moment;
 use tickbus_reply::{Condition, real};
 
 use super::{Archive, Mark, millis};
@@ -83,6 +81,14 @@ fn conditions(text: &str, table: &SignalTable) -> Result<Vec<Condition>, Mistake
     Ok(found)
 }
 
+/// The answer to a search.
+pub(super) struct Found {
+    /// The number and the time of the tick.
+    pub(super) at: Option<(u64, Nanos)>,
+    /// The last tick that was looked at.
+    until: u64,
+}
+
 /// The conditions of a search, with the values of the tick before.
 struct Search<'a> {
     table: &'a SignalTable,
@@ -126,11 +132,10 @@ impl Search<'_> {
 
 /// The forces of one signal, each from its tick on; `None` where the signal is free again.
 struct Forces {
-    signal: usize,
     place: usize,
     turns: Vec<(u64, Option<Mark>)>,
-    /// The force of the current tick, since when, and the value before it.
-    on: Option<(Force, Nanos, Option<Slot>)>,
+    /// The force of the current tick, and since when.
+    on: Option<(Force, Nanos)>,
     next: usize,
 }
 
@@ -147,6 +152,18 @@ impl Archive {
             Ok(conditions) => conditions,
             Err(mistake) => return json!({ "wrong": mistake.to_string() }).to_string(),
         };
+        let found = self.search(conditions, is_forward, from);
+        let first = self.history.span().map_or(0, |span| span.first.0);
+        json!({
+            "tick": found.at.map(|(tick, _)| tick), "ms": found.at.map(|(_, time)| millis(time)),
+            "until": found.until, "is_cut": is_forward && from > 0 && from + 1 < first,
+        })
+        .to_string()
+    }
+
+    /// The next tick after this one at which conditions begin to hold, or the last one before it.
+    pub(super) fn search(&self, conditions: Vec<Condition>, is_forward: bool, from: u64) -> Found {
+        let table = &self.facts.table;
         let mut signals: Vec<usize> = conditions.iter().map(|it| it.signal).collect();
         signals.sort_unstable();
         signals.dedup();
@@ -170,7 +187,6 @@ impl Archive {
             .filter(|(_, signal)| self.has_forces(**signal))
             .map(|(place, signal)| self.forces(*signal, place))
             .collect();
-        let first = self.history.span().map_or(0, |span| span.first.0);
         // A force that is not known yet may be on in the newest ticks. Only after a restart the last tick is before `from`.
         let known = self.notes().known.unwrap_or(u64::MAX);
         let until = self.last().min(known.max(from));
@@ -194,20 +210,15 @@ impl Archive {
                 }
                 found.is_none() || !is_forward
             });
-        json!({
-            "tick": found.map(|(tick, _)| tick), "ms": found.map(|(_, time)| millis(time)),
-            "until": until, "is_cut": is_forward && from > 0 && from + 1 < first,
-        })
-        .to_string()
+        Found { at: found, until }
     }
 
     /// The forces of a signal.
     fn forces(&self, signal: usize, place: usize) -> Forces {
         let mut turns: Vec<(u64, Option<Mark>)> = Vec::new();
         let mut on: Option<String> = None;
-        let marks = self.notes().marks.clone();
         let is_of = |mark: &Mark| mark.force.is_some_and(|force| force.signal == signal);
-        for mark in marks.into_iter().filter(is_of) {
+        for mark in self.last_marks(usize::MAX, is_of) {
             if mark.begins {
                 on = Some(mark.text.clone());
                 turns.push((mark.tick, Some(mark)));
@@ -217,7 +228,6 @@ impl Archive {
             }
         }
         Forces {
-            signal,
             place,
             turns,
             on: None,
@@ -232,19 +242,10 @@ impl Archive {
         if due > 0 {
             forces.next += due;
             let mark = forces.turns[forces.next - 1].1.as_ref();
-            forces.on = mark.and_then(|mark| {
-                let since = self.time_of(mark).unwrap_or(time);
-                let is_open =
-                    |force: &Force| matches!(force.effect, SignalEffect::Ramp { from: None, .. });
-                let own = mark.force.filter(is_open).and_then(|_| {
-                    let begun = self.history.at(Moment::Time(since))?;
-                    Some(begun.values[forces.signal])
-                });
-                Some((mark.force?, since, own))
-            });
+            forces.on = mark.and_then(|mark| Some((mark.force?, mark.since())));
         }
-        let (force, since, own) = forces.on?;
-        self.forced(force, own, time - since)
+        let (force, since) = forces.on?;
+        self.forced(force, time - since)
     }
 }
 
@@ -297,7 +298,7 @@ mod tests {
                 ..SignalTable::default()
             },
             reads: Some(Area::Input),
-            is_fail_safe: false,
+            fail_safe: Vec::new(),
             is_sampled: false,
             has_bits: false,
         };

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use serde_json::json;
 use tickbus_base::time::Nanos;
-use tickbus_driver::Force;
+use tickbus_driver::{FailSafeValues, Force};
 use tickbus_fieldbus::faults::{FaultStatus, Lasts, Phase};
 use tickbus_fieldbus::{Link, LinkState};
 use tickbus_image::signal::{Area, Signal, SignalTable};
@@ -36,8 +36,8 @@ pub(crate) struct Facts {
     pub(crate) table: SignalTable,
     /// The area that this end reads, whose values can be stale; without one, every value can be.
     pub(crate) reads: Option<Area>,
-    /// Per station, true if its stale values are fail-safe ones; false for others.
-    pub(crate) fail_safe: Vec<bool>,
+    /// Which stale values are fail-safe values.
+    pub(crate) fail_safe: FailSafeValues,
     /// Some samples, and not every tick.
     pub(crate) is_sampled: bool,
     /// True if values have raw bits.
@@ -393,9 +393,10 @@ impl Archive {
             let flags = if is_forced {
                 FORCED
             } else if can_be_stale && !(0..2).contains(status) {
-                match self.facts.fail_safe.get(signal.station) {
-                    Some(true) => STALE | FAIL_SAFE,
-                    _ => STALE,
+                if self.facts.fail_safe.has(signal) {
+                    STALE | FAIL_SAFE
+                } else {
+                    STALE
                 }
             } else {
                 0

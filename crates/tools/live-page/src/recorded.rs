@@ -8,6 +8,7 @@ use tickbus_base::Mistake;
 use tickbus_base::statistics::Statistics;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::shown;
+use tickbus_driver::FailSafeValues;
 use tickbus_fieldbus::{Cause, Link, LinkState, Role};
 use tickbus_image::signal::{Area, DataType, Latch, Signal, SignalTable, Slot};
 use tickbus_record::{Column, Columns, History, Recording, Tick, ValueKind};
@@ -83,7 +84,7 @@ impl Recorded {
                 ..SignalTable::default()
             },
             reads: reads(&role),
-            fail_safe: Vec::new(),
+            fail_safe: FailSafeValues::None,
             is_sampled: false,
             has_bits: false,
         };

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use tickbus_base::statistics::Statistics;
 use tickbus_base::time::Nanos;
+use tickbus_driver::FailSafeValues;
 use tickbus_fieldbus::{Cause, LinkState};
 use tickbus_image::signal::{Area, Signal, SignalTable, Slot};
 use tickbus_record::{Column, Columns, History, Tick, ValueKind};
@@ -173,7 +174,7 @@ impl ShownRun {
                 ..SignalTable::default()
             },
             reads: None,
-            fail_safe: Vec::new(),
+            fail_safe: FailSafeValues::None,
             is_sampled: true,
             has_bits: false,
         };

@@ -7,10 +7,10 @@ use tickbus_base::Mistake;
 use tickbus_base::statistics::Statistics;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{did_you_mean, shown};
-use tickbus_driver::Watch;
+use tickbus_driver::{FailSafeValues, Watch};
 use tickbus_fieldbus::faults::SignalEffect;
 use tickbus_fieldbus::{Link, LinkState, Role};
-use tickbus_image::signal::{Area, Latch, Signal, SignalTable, Slot};
+use tickbus_image::signal::{Area, Latch, Signal, Slot};
 use tickbus_web::Refused;
 
 use crate::archive::{Archive, Facts};
@@ -76,16 +76,17 @@ impl Shown {
     pub(crate) fn new(id: i32, watch: Watch, options: Options, now: Nanos) -> Self {
         let config = watch.config();
         let archive = watch.history().map(|history| {
-            let reads = watch.role().areas().1;
-            let is_of_machine = watch.role() == Role::Device;
-            let stations = 0..config.table.stations.len();
-            let fail_safe = stations.map(|station| {
-                watch.is_driver() || is_of_machine && states_all(&config.table, station, reads)
-            });
+            let fail_safe = if watch.is_driver() {
+                FailSafeValues::All
+            } else if watch.role() == Role::Device {
+                FailSafeValues::Stated
+            } else {
+                FailSafeValues::None
+            };
             let facts = Facts {
                 table: config.table.clone(),
-                reads: Some(reads),
-                fail_safe: fail_safe.collect(),
+                reads: Some(watch.role().areas().1),
+                fail_safe,
                 is_sampled: false,
                 has_bits: true,
             };
@@ -481,13 +482,6 @@ impl Exhibit for Shown {
     }
 }
 
-/// True if all signals of a station's area state a fail-safe value: a machine behind its bus then has no other values
-/// without its PLC.
-fn states_all(table: &SignalTable, station: usize, area: Area) -> bool {
-    let mut signals = table.signals.iter();
-    signals.all(|it| it.station != station || it.area != area || it.states_fail_safe)
-}
-
 /// The simulation does not take it over.
 fn conflict(mistake: &Mistake) -> Refused {
     Refused {
@@ -511,30 +505,4 @@ fn fault_value(name: &str, text: &str) -> Result<f64, Refused> {
             shown(text)
         ),
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use tickbus_image::signal::DataType;
-
-    #[test]
-    fn a_station_has_fail_safe_values_if_all_of_its_signals_state_one() {
-        let signal = |station, area, states_fail_safe| Signal {
-            station,
-            states_fail_safe,
-            ..Signal::new("a", area, 0, DataType::Byte)
-        };
-        let table = SignalTable {
-            signals: vec![
-                signal(0, Area::Output, true),
-                signal(0, Area::Input, false),
-                signal(1, Area::Output, true),
-                signal(1, Area::Output, false),
-            ],
-            ..SignalTable::default()
-        };
-        let all = |station| states_all(&table, station, Area::Output);
-        assert_eq!([0, 1].map(all), [true, false]);
-    }
 }

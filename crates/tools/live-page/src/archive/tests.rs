@@ -36,7 +36,7 @@ fn archive_within(limit: usize, ticks: u64) -> Archive {
     let facts = Facts {
         table,
         reads: Some(Area::Input),
-        fail_safe: vec![true],
+        fail_safe: FailSafeValues::All,
         is_sampled: false,
         has_bits: true,
     };
@@ -389,7 +389,7 @@ fn edges_that_the_history_lacks_are_unknown() {
 }
 
 #[test]
-fn a_stale_value_is_marked_as_its_station_says() {
+fn a_stale_value_is_marked_as_fail_safe_if_it_is() {
     let mut archive = archive();
     archive.facts.reads = Some(Area::Output);
     archive.history.push(&Tick {
@@ -400,6 +400,8 @@ fn a_stale_value_is_marked_as_its_station_says() {
     });
     let flags = |archive: &Archive| state(archive, 21)["values"][0][4].as_u64();
     assert_eq!(flags(&archive), Some(u64::from(STALE | FAIL_SAFE)));
-    archive.facts.fail_safe = vec![false];
+    archive.facts.fail_safe = FailSafeValues::Stated;
     assert_eq!(flags(&archive), Some(u64::from(STALE)));
+    archive.facts.table.signals[0].states_fail_safe = true;
+    assert_eq!(flags(&archive), Some(u64::from(STALE | FAIL_SAFE)));
 }

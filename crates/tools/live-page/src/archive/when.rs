@@ -260,6 +260,7 @@ mod tests {
     use super::*;
     use crate::archive::Facts;
     use crate::forcing::Way;
+    use tickbus_driver::FailSafeValues;
 
     /// The values of a tick: of "Run", "Start and stop", "Level" and "Phase". The last one is read, and can be stale.
     type Values = [f64; 4];
@@ -298,7 +299,7 @@ mod tests {
                 ..SignalTable::default()
             },
             reads: Some(Area::Input),
-            fail_safe: Vec::new(),
+            fail_safe: FailSafeValues::None,
             is_sampled: false,
             has_bits: false,
         };

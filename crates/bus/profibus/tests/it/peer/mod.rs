@@ -99,7 +99,7 @@ impl Master {
     }
 }
 
-/// What the master has seen, even after an assertion about it has failed: the master must go on, and end with its test.
+/// The master's knowledge, even after an assertion about it has failed: the master must go on, and end with its test.
 fn locked(seen: &Mutex<Vec<Seen>>) -> MutexGuard<'_, Vec<Seen>> {
     seen.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -287,6 +287,7 @@ fn a_screen_reader_reads_the_main_states_in_order() {
     browser.wait("!document.getElementById('failsafe').hidden");
     let machine_view = tree(&browser);
     show(&browser, "line");
+    browser.wait("document.querySelector('.faults li')");
     let line_view = tree(&browser);
     show(&browser, "signals");
     browser.run("list.select(plant.signals[0])");

@@ -162,6 +162,20 @@ impl Fixture {
     }
 }
 
+#[test]
+fn the_studio_of_a_driver_that_was_closed_says_so() {
+    let fixture = Fixture::start();
+    let browser = Browser::start(1280, 800);
+    browser.go(&fixture.url_of("/studio"));
+    wait_page(&browser, "/studio");
+    drop(fixture._seat);
+    browser.wait("document.getElementById('told').textContent === 'This driver has been closed. Open it again, or choose another page.'");
+    browser.wait("document.getElementById('link').textContent === 'closed' && document.querySelector('main').inert");
+    let shown =
+        "return ['access', 'saved'].filter((id) => document.getElementById(id).checkVisibility())";
+    assert_eq!(browser.run(shown), json!([]));
+}
+
 const LIVE: &str = "document.getElementById('link').textContent === 'live' && ";
 
 /// Waits for the page with the token, and for what it shows.

@@ -356,10 +356,12 @@
     tabs: views.tabs,
     link: () => (isRecording() ? ["recording", ""] : bar.moment ? ["paused", "stale"] : null),
     news(text) {
-      const { isOther, isLine } = plant.hear(text);
-      if (isOther) renew();
-      if (isLine) line.show();
+      const heard = plant.hear(text);
+      if (!heard) return false;
+      if (heard.isOther) renew();
+      if (heard.isLine) line.show();
       redraw();
+      return true;
     },
     access(isRight, refusal) {
       mayForce = isRight;

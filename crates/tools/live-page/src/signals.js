@@ -135,9 +135,10 @@ const plant = (() => {
     }
   }
 
-  /** Applies an event. Returns whether the signals were replaced, and whether the line has changed. */
+  /** Applies an event. Returns whether the signals were replaced, and whether the line has changed; null for one of another kind of page. */
   function hear(text) {
     const event = JSON.parse(text);
+    if (event.layout === undefined) return null;
     time = event.time_ms;
     heard = performance.now();
     const isFull = event.full === true;

@@ -170,6 +170,7 @@ const plant = (() => {
 
   /** Shows a moment of a driver's past: its answer, with all signals or those that differ from the moment shown now. */
   function showPast(driver, moment, isStep) {
+    if (!isPast) for (const signal of signals) if (!signal.driver.past) show(signal, null, "", null, 0);
     isPast = true;
     for (const [index, value, raw = null, edges = null, flags = 0] of moment.values) {
       const signal = driver.signals[index];

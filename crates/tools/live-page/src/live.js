@@ -54,9 +54,9 @@
     change("PUT", pathOf(signal), value + suffix, done);
   }
 
-  function release(signal) {
+  function release(signal, isQuiet = false) {
     if (!signal || !mayForce) return;
-    change("DELETE", pathOf(signal), undefined, `${signal.name} is released${bar.moment ? " now; the page shows the past" : ""}.`);
+    change("DELETE", pathOf(signal), undefined, isQuiet ? "" : `${signal.name} is released${bar.moment ? " now; the page shows the past" : ""}.`);
   }
 
   /** True if a signal can be forced now; says why if not. */

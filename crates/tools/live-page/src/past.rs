@@ -295,7 +295,11 @@ mod tests {
             ("/history/1/save/0/9.vcd", true),
             ("/history/1/save/0/9.html", true),
         ] {
-            assert_eq!(std::ptr::eq(door.to(path), &door.files), is_file, "{path}");
+            assert_eq!(
+                std::ptr::eq(door.to(path), &raw const door.files),
+                is_file,
+                "{path}"
+            );
         }
     }
 

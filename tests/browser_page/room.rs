@@ -93,7 +93,7 @@ impl Site for Counter {
 struct Fixture {
     _serving: Serving,
     _joined: Joined,
-    _seat: Seat,
+    seat: Seat,
     _member: Member,
     _live: LivePage,
     board: Board,
@@ -138,7 +138,7 @@ impl Fixture {
         Self {
             _serving: serving.expect("a thread"),
             _joined: joined,
-            _seat: seat,
+            seat,
             _member: member,
             _live: live,
             board,
@@ -168,7 +168,7 @@ fn the_studio_of_a_driver_that_was_closed_says_so() {
     let browser = Browser::start(1280, 800);
     browser.go(&fixture.url_of("/studio"));
     wait_page(&browser, "/studio");
-    drop(fixture._seat);
+    drop(fixture.seat);
     browser.wait("document.getElementById('told').textContent === 'This driver has been closed. Open it again, or choose another page.'");
     browser.wait("document.getElementById('link').textContent === 'closed' && document.querySelector('main').inert");
     let shown =

@@ -168,7 +168,7 @@ fn a_change_is_undone_unless_somebody_else_has_changed_the_same() {
     click(&browser, "#undo");
     wait_said(
         &browser,
-        "Cannot undo \"Connected PUMP:Q1 with LOGO:I1\": LOGO:I1 is connected with PUMP:Q2 now, because somebody else has changed it.",
+        "Cannot undo \"Connected PUMP:Q1 with LOGO:I1\": LOGO:I1 is connected with PUMP:Q2 now. Nothing was changed.",
     );
     click(&browser, "#undo");
     wait_said(&browser, "Nothing to undo.");
@@ -206,6 +206,17 @@ fn quick_steps_keep_each_other_and_half_an_undone_step_is_reported() {
     browser.wait("!lab.clients.has('FAN')");
     click(&browser, "#undo");
     wait_said(&browser, "Undone: Cut all, but ERR 404 ");
+    browser.wait("lab.cables.size === 1");
+    // The rest waits for its client.
+    browser.run("document.getElementById('status').textContent = ''");
+    click(&browser, "#undo");
+    wait_said(&browser, "ERR 404 ");
+    let _fan = lab.join("VP FAN I01");
+    browser.wait("lab.clients.get('FAN')?.isHere");
+    click(&browser, "#undo");
+    wait_said(&browser, "Undone: Cut all.");
+    browser.wait("lab.cables.size === 2");
+    click(&browser, "#redo");
     browser.wait("lab.cables.size === 1");
     click(&browser, "#redo");
     wait_said(&browser, "Repeated: Cut all.");

@@ -6,6 +6,7 @@ mod lists;
 mod outage;
 mod past;
 mod phone;
+mod replaced;
 mod sparks;
 mod touch;
 mod two_drivers;
@@ -122,11 +123,16 @@ impl Machine {
         self.child.wait().expect("it ends");
     }
 
+    /// The host and port of its page.
+    fn page(&self) -> &str {
+        let page = self.url.split('#').next().expect("an address");
+        page.trim_start_matches("http://").trim_end_matches('/')
+    }
+
     /// Restarts it, with the page at the same address but with another token.
     fn restart(&mut self) {
         self.kill();
-        let page = self.url.split('#').next().expect("an address");
-        let page = page.trim_start_matches("http://").trim_end_matches('/');
+        let page = self.page();
         let file = self.folder.path().join("tank.cfg");
         let text = fs::read_to_string(&file).expect("its file");
         let text = text.replacen(

@@ -69,9 +69,14 @@ fn find(lines: &mut Lines<BufReader<ChildStdout>>, words: &str) -> String {
 
 impl Lab {
     fn new() -> Self {
+        Self::at("127.0.0.1:0")
+    }
+
+    /// With its page at this address.
+    fn at(page: &str) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let patch = folder.path().join("patch.toml");
-        let (child, address, url) = start(&patch, "127.0.0.1:0", "127.0.0.1:0");
+        let (child, address, url) = start(&patch, "127.0.0.1:0", page);
         Self {
             child,
             address,

@@ -93,7 +93,7 @@ impl Site for Counter {
 struct Fixture {
     _serving: Serving,
     _joined: Joined,
-    _seat: Seat,
+    seat: Seat,
     _member: Member,
     _live: LivePage,
     board: Board,
@@ -138,7 +138,7 @@ impl Fixture {
         Self {
             _serving: serving.expect("a thread"),
             _joined: joined,
-            _seat: seat,
+            seat,
             _member: member,
             _live: live,
             board,
@@ -160,6 +160,20 @@ impl Fixture {
         write!(stream, "VP {name} Q01 I01\r\nP Q1=24\r\n").expect("it reads");
         stream
     }
+}
+
+#[test]
+fn the_studio_of_a_driver_that_was_closed_says_so() {
+    let fixture = Fixture::start();
+    let browser = Browser::start(1280, 800);
+    browser.go(&fixture.url_of("/studio"));
+    wait_page(&browser, "/studio");
+    drop(fixture.seat);
+    browser.wait("document.getElementById('told').textContent === 'This driver has been closed. Open it again, or choose another page.'");
+    browser.wait("document.getElementById('link').textContent === 'closed' && document.querySelector('main').inert");
+    let shown =
+        "return ['access', 'saved'].filter((id) => document.getElementById(id).checkVisibility())";
+    assert_eq!(browser.run(shown), json!([]));
 }
 
 const LIVE: &str = "document.getElementById('link').textContent === 'live' && ";

@@ -116,6 +116,28 @@ fn a_jump_to_a_change_of_another_driver_shows_the_very_tick_of_it() {
 }
 
 #[test]
+fn a_moment_that_leaves_the_memory_gives_way_to_the_oldest_one() {
+    let machine = filled();
+    let browser = open(&machine, 1280, 800);
+    wait_shown(&browser, "Level", "250.00mm");
+    browser.run("await bar.show('tick/7')");
+    browser.wait("bar.moment?.tick === 7");
+    // Nothing is saved from before the oldest tick; and the memory has lost this one tick.
+    let said = browser.run(
+        "const { past } = plant.drivers[0]; const { first } = past; \
+         Object.defineProperty(past, 'first', { get: () => (bar.moment?.tick === 7 ? bar.moment.ms + 1 : first), set() {} }); \
+         document.querySelector('#save [data-ending=vcd]').click(); \
+         return document.getElementById('status').textContent",
+    );
+    assert_eq!(
+        said,
+        "The moment that is shown has left the memory, so that nothing before it can be saved."
+    );
+    wait_said(&browser, "the page shows the oldest that is left");
+    browser.wait("bar.moment.tick < 7 && document.getElementById('moment').textContent.endsWith(`tick ${bar.moment.tick}`)");
+}
+
+#[test]
 fn drivers_that_have_left_take_the_past_with_them() {
     let machine = filled();
     let browser = open(&machine, 1280, 800);

@@ -161,6 +161,36 @@ fn a_large_button_holds_its_signal_while_a_finger_is_on_it_and_does_not_move() {
 }
 
 #[test]
+fn a_large_switch_is_turned_twice_at_the_same_place() {
+    let picture = PICTURE.replace("data-tb-press", "data-tb-switch");
+    let machine = Machine::with(
+        "modbus-server",
+        "picture = \"tank.svg\"\n",
+        TANK,
+        &[("tank.svg", &picture)],
+    );
+    let browser = phone(&machine, 390, 844);
+    browser.wait("document.querySelector('.pad')?.checkVisibility()");
+    let places = || {
+        browser.run(
+            "return ['.pad', '#pause'].map((it) => document.querySelector(it).getBoundingClientRect().top)",
+        )
+    };
+    let before = places();
+    for hidden in [false, true] {
+        finger(&browser, "touchStart", Some(".pad"));
+        finger(&browser, "touchEnd", None);
+        browser.wait(&format!(
+            "document.getElementById('forced').hidden === {hidden}"
+        ));
+        // Longer than the answer takes.
+        browser.run("await room.ask('/access')");
+        assert_eq!(places(), before);
+    }
+    assert_quiet(&browser);
+}
+
+#[test]
 fn a_phone_that_is_turned_keeps_the_moment_and_the_view() {
     let machine = tank();
     let browser = phone(&machine, 390, 844);
@@ -287,7 +317,8 @@ fn a_screen_reader_reads_the_main_states_in_order() {
     browser.wait("!document.getElementById('failsafe').hidden");
     let machine_view = tree(&browser);
     show(&browser, "line");
-    browser.wait("document.querySelector('.faults li')");
+    // The forced signal comes with the next state of the line.
+    browser.wait("document.querySelector('.faults li')?.checkVisibility()");
     let line_view = tree(&browser);
     show(&browser, "signals");
     browser.run("list.select(plant.signals[0])");

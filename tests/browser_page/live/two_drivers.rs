@@ -1,5 +1,7 @@
 //! Two drivers of one process on one page, with ticks of their own.
 
+use std::fs;
+use std::path::Path;
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 
@@ -23,11 +25,12 @@ struct Ticking {
 }
 
 impl Ticking {
-    fn start(page: &LivePage, id: i32, name: &str, tick: Nanos) -> Self {
+    fn start(page: &LivePage, id: i32, name: &str, tick: Nanos, folder: Option<&Path>) -> Self {
+        let history = if name == "Bare" { "history = 0" } else { "" };
         let gate = if name == "Fast" { "Gate" } else { "hold" };
         let text = format!(
             "[driver]\nid = {id}\nname = \"{name}\"\n[fieldbus]\nkind = \"loopback\"\nprogram = \"mirror\"\n\
-             scan = \"1ms\"\ncycle = \"1ms\"\n[page]\n[[signal]]\nname = \"{name} level\"\naddress = \"%ID0\"\n\
+             scan = \"1ms\"\ncycle = \"1ms\"\n[page]\n{history}\n[[signal]]\nname = \"{name} level\"\naddress = \"%ID0\"\n\
              type = \"REAL\"\n[[signal]]\nname = \"{name} back\"\naddress = \"%QD0\"\ntype = \"REAL\"\n\
              [[signal]]\nname = \"Run  and hold\"\naddress = \"%IX4.0\"\ntype = \"BOOL\"\n\
              [[signal]]\nname = \"{gate}\"\naddress = \"%IX4.1\"\ntype = \"BOOL\"\n"
@@ -38,7 +41,7 @@ impl Ticking {
         let options = Options {
             grace: None,
             picture: None,
-            lists: None,
+            lists: folder.map(|folder| folder.join(format!("{name}.lists.toml"))),
         };
         let member = page.join(driver.watch(), options);
         let stop = Arc::new(Stop::new());
@@ -74,21 +77,25 @@ impl Drop for Ticking {
     }
 }
 
-/// Two drivers on a page, and a browser. The bar shows the time of the slow one.
 fn opened() -> (LivePage, [Ticking; 2], Serving, Browser) {
+    opened_beside(None)
+}
+
+/// Two drivers on a page, with their lists in this folder, and a browser. The bar shows the time of the slow one.
+fn opened_beside(folder: Option<&Path>) -> (LivePage, [Ticking; 2], Serving, Browser) {
     let page = LivePage::open(Monotonic::shared()).expect("a thread");
     let room = Room::bind(&Address::local(0), Limits::default()).expect("a port");
-    let address = room.address();
+    let url = room.url();
     let serving = room.serve(
         tickbus_web::Pages::of("Live page", page.site()),
         Monotonic::shared(),
     );
     let drivers = [
-        Ticking::start(&page, 1, "Slow", Nanos::from_millis(97)),
-        Ticking::start(&page, 2, "Fast", Nanos::from_millis(11)),
+        Ticking::start(&page, 1, "Slow", Nanos::from_millis(97), folder),
+        Ticking::start(&page, 2, "Fast", Nanos::from_millis(11), folder),
     ];
     let browser = Browser::start(1280, 900);
-    browser.go(&format!("http://{address}/"));
+    browser.go(&url);
     browser.wait("bar.lead?.name === 'Slow' && plant.drivers.every(({ past }) => past?.tick > 12)");
     (page, drivers, serving.expect("a thread"), browser)
 }
@@ -181,4 +188,78 @@ fn the_cursor_goes_from_edge_to_edge_of_a_driver_whose_ticks_the_bar_does_not_ha
         "from {first}"
     );
     assert_quiet(&browser);
+}
+
+#[test]
+fn a_jump_to_an_outage_is_about_the_driver_of_the_chosen_signal() {
+    let (_page, _drivers, _serving, browser) = opened();
+    browser.run(
+        "const { ask } = room; window.asked = []; \
+         room.ask = (path, options) => { asked.push(path.replace(/\\d{3,}$/, '')); return ask(path, options); }; \
+         list.select(plant.signals.find(({ name }) => name === 'Fast level'))",
+    );
+    browser.wait("asked.includes('/history/1') && asked.includes('/history/2')");
+    browser.run("await bar.jump(false, 'outage')");
+    browser.wait("asked.includes('/history/2/last/outage/')");
+    assert_quiet(&browser);
+}
+
+#[test]
+fn a_driver_without_a_history_has_no_values_in_the_past() {
+    let (page, _drivers, _serving, browser) = opened();
+    let _bare = Ticking::start(&page, 3, "Bare", Nanos::from_millis(11), None);
+    let shown = "words.value(plant.signals.find(({ name }) => name === 'Bare level'))";
+    browser.wait(&format!("plant.drivers.length === 3 && {shown} > 3"));
+    browser.run("document.getElementById('pause').click()");
+    browser.wait(&format!("bar.moment && {shown} === '–'"));
+    browser.run("document.getElementById('to-live').click()");
+    browser.wait(&format!("!bar.moment && {shown} > 3"));
+    assert_quiet(&browser);
+}
+
+/// Saves what is shown as a list.
+fn save_as(browser: &Browser, name: &str) {
+    browser.run(&format!(
+        "document.getElementById('watch-new').value = {}; document.getElementById('watch-file').requestSubmit()",
+        json!(name)
+    ));
+}
+
+const LEVELS: &str =
+    "for (const signal of plant.signals) if (signal.name.endsWith('level')) watch.pin(signal)";
+
+#[test]
+fn a_list_that_is_not_saved_everywhere_is_saved_nowhere() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let flow = "[[list]]\nname = \"Flow\"\npins = []\n";
+    fs::write(folder.path().join("Fast.lists.toml"), flow).expect("there is room");
+    let (_page, drivers, _serving, browser) = opened_beside(Some(folder.path()));
+    browser.wait(
+        "watch.files.size === 2 && document.getElementById('access').textContent === 'may force'",
+    );
+    browser.run(LEVELS);
+    save_as(&browser, "Flow");
+    wait_said(
+        &browser,
+        "There is a list \"Flow\" already, which is not overwritten; take another name.",
+    );
+    assert!(!folder.path().join("Slow.lists.toml").exists());
+    save_as(&browser, "Levels");
+    wait_said(&browser, "The list \"Levels\" is saved in ");
+    for (name, other) in [("Slow", "Fast"), ("Fast", "Slow")] {
+        let file = folder.path().join(format!("{name}.lists.toml"));
+        let text = fs::read_to_string(file).expect("it is saved");
+        assert!(
+            text.contains(&format!("{name} level")) && !text.contains(other),
+            "{text}"
+        );
+    }
+    // The pin of a driver that has left waits for it.
+    let [_slow, fast] = drivers;
+    drop(fast);
+    browser.wait("plant.drivers.length === 1 && watch.files.size === 1");
+    let told = browser.run(
+        "return [watch.pinned().length, document.getElementById('status').textContent.includes('changed')]",
+    );
+    assert_eq!(told, json!([2, false]));
 }

@@ -46,7 +46,7 @@ const changes = (() => {
     return Object.fromEntries(KEYS.filter((key) => before?.[key] !== after?.[key]).map((key) => [key, wanted?.[key] ?? null]));
   }
 
-  /** A sentence about the first fact that somebody else has changed; undefined if all are as they should be. */
+  /** A sentence about the first fact that has changed since; undefined if all are as they should be. */
   function foreign(facts, side) {
     for (const fact of facts) {
       const present = now(fact);
@@ -113,7 +113,7 @@ const changes = (() => {
   }
   const step = (text, facts) => queue(() => carryOut(text, facts));
 
-  /** Undoes or repeats the last step, unless somebody else has changed the same meanwhile. */
+  /** Undoes or repeats the last step, unless the same has changed meanwhile: by somebody else, or because a client left. */
   const turn = (from, to, [here, there], word) => queue(async () => {
     const last = from.pop();
     if (!last) {
@@ -128,12 +128,15 @@ const changes = (() => {
       other = foreign(last.facts, here);
     }
     if (other) {
-      say(`Cannot ${word} "${last.text.replace(/\.$/, '')}": ${other}, because somebody else has changed it. Nothing was changed.`, true);
+      say(`Cannot ${word} "${last.text.replace(/\.$/, '')}": ${other}. Nothing was changed.`, true);
       return;
     }
     const { made, why } = await make(word === 'undo' ? last.facts.slice().reverse() : last.facts, there);
-    if (made.length) to.push({ text: last.text, facts: last.facts.filter((fact) => made.includes(fact)) });
-    else if (why === LOST) from.push(last);
+    // What was refused can be done later, as when its client is back.
+    for (const [list, isMade] of [[to, true], [from, false]]) {
+      const facts = last.facts.filter((fact) => made.includes(fact) === isMade);
+      if (facts.length) list.push({ text: last.text, facts });
+    }
     report(`${word === 'undo' ? 'Undone' : 'Repeated'}: ${last.text}`, made, why);
   });
 

@@ -343,7 +343,7 @@
 
   function show(text) {
     const taken = lab.take(JSON.parse(text));
-    if (!taken) return;
+    if (!taken) return false;
     board.show(taken);
     matrix.show(taken);
     showForced();
@@ -362,6 +362,7 @@
     } else if (chosen && taken.changed.some(({ name }) => name === chosen)) {
       showChosen();
     }
+    return true;
   }
 
   changes.listen(say);

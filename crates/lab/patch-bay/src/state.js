@@ -118,9 +118,10 @@ const lab = (() => {
 
   /**
    * Takes over an event. Returns { isOther, reshaped, changed, placed }: whether clients or cables are others, which clients
-   * have another shape, which channels another value, and whether boxes have other places. Null without a whole state.
+   * have another shape, which channels another value, and whether boxes have other places. Null without a whole state, and for that of another kind of page, which has the number of a run.
    */
   function take(event) {
+    if (event.run !== undefined) return null;
     if (event.full) {
       present = new Map();
       cables.clear();

@@ -16,13 +16,16 @@ const bar = (() => {
   let lead = null;
   /** How much later another driver's time is than the lead's, by its id, in milliseconds. */
   let offsets = new Map();
-  /** The moment that the lead shows: `{ ms, tick }`; null for the present. */
+  /** The moment that the lead shows: `{ ms, tick, isLost }`; null for the present. */
   let moment = null;
   /** The moment to show next, and whether one is on its way. */
   let wanted = null;
   let isBusy = false;
   let isDragged = false;
-  let overview = { outages: [], marks: [] };
+  /** True if it was told that moments have left the memory, which goes on in the same pause. */
+  let isTold = false;
+  /** The outages and faults of each driver, as `[driver, { outages, marks }]`. */
+  let overviews = [];
   let looked = -Infinity;
   let colours = null;
   /** The width of the bands in pixels, and what they were painted from. */
@@ -88,7 +91,8 @@ const bar = (() => {
         const first = await fetchOne(lead, place, isStep);
         if (!first || (wanted && wanted.isLive)) break;
         first();
-        moment = { ms: own?.ms ?? lead.moment.ms, tick: lead.moment.tick };
+        // Another driver's memory may reach further back than the lead's.
+        moment = { ms: own?.ms ?? lead.moment.ms, tick: lead.moment.tick, isLost: own !== null };
         const others = plant.drivers.filter((driver) => driver !== lead && driver.past);
         const placeOf = (driver) => (driver === own?.driver ? own.place : placeIn(driver));
         for (const shown of await Promise.all(others.map((driver) => fetchOne(driver, placeOf(driver), isStep)))) shown?.();
@@ -115,6 +119,7 @@ const bar = (() => {
   function leave() {
     wanted = null;
     moment = null;
+    isTold = false;
     plant.showPresent();
     act.shown();
   }
@@ -150,11 +155,12 @@ const bar = (() => {
     const signal = act.chosen();
     if (goal === "signal" && !signal) return act.say("Choose the signal whose change you look for.", true);
     const when = goal === "when" ? act.when() : null;
-    const driver = when?.driver ?? (goal === "signal" ? signal.driver : lead);
+    const isOfSignal = goal === "signal" || (goal !== "when" && signal?.driver.past);
+    const driver = when?.driver ?? (isOfSignal ? signal.driver : lead);
     // The present is later than what the page has heard of.
     const from = driver.moment?.tick ?? Number.MAX_SAFE_INTEGER;
     const what = goal === "signal" ? signal.index : goal;
-    const name = when ? `beginning of “${when.text}”` : goal === "signal" ? `change of ${signal.name}` : goal;
+    const name = when ? `beginning of “${when.text}”` : goal === "signal" ? `change of ${signal.name}` : plant.drivers.length > 1 ? `${goal} of ${driver.name}` : goal;
     try {
       const answer = await room.ask(path(driver, `${isForward ? "next" : "last"}/${what}/${from}${when ? `/${encodeURIComponent(when.text)}` : ""}`));
       if (!answer.ok) return act.say(await refusal(answer), true);
@@ -174,6 +180,7 @@ const bar = (() => {
     const driver = act.chosen()?.driver ?? lead;
     if (!driver?.past) return;
     const until = driver.moment?.ms ?? driver.past.last;
+    if (until < driver.past.first) return act.say("The moment that is shown has left the memory, so that nothing before it can be saved.", true);
     const span = Number(get("save-span").value);
     const from = span ? Math.max(driver.past.first, until - span) : driver.past.first;
     act.say("The file is being made.");
@@ -196,10 +203,14 @@ const bar = (() => {
   async function look() {
     if (!lead?.past || document.hidden || performance.now() - looked < PERIOD) return;
     looked = performance.now();
-    const driver = lead;
-    try {
+    const leader = lead;
+    const found = plant.drivers.filter(({ past }) => past).map(async (driver) => {
       const answer = await room.ask(path(driver, "").slice(0, -1));
-      if (answer.ok && driver === lead) overview = await answer.json();
+      return answer.ok ? [[driver, await answer.json()]] : [];
+    });
+    try {
+      const now = (await Promise.all(found)).flat();
+      if (leader === lead) overviews = now;
     } catch {
       // The page says if the server does not answer.
     }
@@ -208,24 +219,28 @@ const bar = (() => {
   /** Paints the bands, if they have changed. */
   function paint() {
     const { first, last } = lead.past;
-    const now = [width, first, last, overview, colours];
+    const now = [width, first, last, overviews, colours];
     if (colours && now.every((it, i) => it === painted[i])) return;
     colours ??= coloursAt(document.body);
-    painted = [width, first, last, overview, colours];
+    painted = [width, first, last, overviews, colours];
     const height = 10;
     const ctx = context(canvas, width, height);
     // As wide as the way of the handle.
     const x = (ms) => 8 + (ms - first) / (last - first || 1) * (width - 16);
     ctx.fillStyle = colours.idle;
     ctx.fillRect(x(first), 3, x(last) - x(first), 4);
-    for (const [begin, end] of overview.outages) {
-      const [left, right] = [x(Math.max(first, begin)), x(Math.min(last, end ?? last))];
-      if (right < left) continue;
-      ctx.fillStyle = colours["stale-text"];
-      ctx.fillRect(left, 2, Math.max(2, right - left), 6);
+    ctx.fillStyle = colours["stale-text"];
+    for (const [driver, { outages }] of overviews) {
+      const own = (ms) => ms - offset(driver);
+      for (const [begin, end] of outages) {
+        const [left, right] = [x(Math.max(first, own(begin))), x(Math.min(last, own(end ?? driver.past.last)))];
+        if (right >= left) ctx.fillRect(left, 2, Math.max(2, right - left), 6);
+      }
     }
     ctx.fillStyle = colours.bad;
-    for (const { ms, begins } of overview.marks) if (begins && ms >= first) ctx.fillRect(x(ms) - 1, 0, 2, height);
+    for (const [driver, { marks }] of overviews) {
+      for (const { ms, begins } of marks) if (begins && ms - offset(driver) >= first) ctx.fillRect(x(ms - offset(driver)) - 1, 0, 2, height);
+    }
   }
 
   // Asking for it in each frame would make the browser lay out the page once more.
@@ -242,7 +257,7 @@ const bar = (() => {
         leave();
         act.say("The drivers were opened again or have changed; the page is live again.");
       }
-      overview = { outages: [], marks: [] };
+      overviews = [];
       looked = -Infinity;
     }
     lead ??= plant.drivers.find(({ past }) => past) ?? null;
@@ -266,9 +281,11 @@ const bar = (() => {
     write(get("moment"), moment ? `${words.moment(at)}${isFile ? ` of ${words.moment(last)}` : ""} · tick ${words.whole(moment.tick)}` : isCut ? `the last ${span} kept` : `${span} recorded`);
     const chosen = act.chosen();
     write(get("goal-signal"), chosen ? `change of ${chosen.name}` : "change of a signal");
-    if (moment && moment.ms < first && !moment.isTold) {
-      moment.isTold = true;
-      act.say("The oldest moments have left the memory; the page shows the oldest that is left.");
+    if (moment && moment.ms < first && !moment.isLost) {
+      moment.isLost = true;
+      if (!isTold) act.say("The oldest moments have left the memory; the page shows the oldest that is left.");
+      isTold = true;
+      show("tick/0");
     }
     paint();
   }

@@ -248,6 +248,12 @@ fn address_of(watch: &Watch, statistics: &Statistics) -> Option<String> {
     watch.address()
 }
 
+/// True for the keys of a single fault, of which a long run has ever more.
+pub(crate) fn is_of_one_fault(key: &str) -> bool {
+    let rest = key.strip_prefix("fault.");
+    rest.is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit()))
+}
+
 /// Sorts statistics into counters, distributions and texts.
 pub(crate) fn sort<'a>(statistics: &'a Statistics, line: &mut Line<'a>) {
     for (key, value) in statistics.iter() {
@@ -272,8 +278,7 @@ pub(crate) fn sort<'a>(statistics: &'a Statistics, line: &mut Line<'a>) {
             .find_map(|part| Some((key.strip_suffix(part)?, &part[1..])));
         if let Some((name, part)) = distribution {
             line.times.entry(name).or_default().insert(part, number);
-        } else if !key.starts_with("fault.") || !key[6..].starts_with(|c: char| c.is_ascii_digit())
-        {
+        } else if !is_of_one_fault(key) {
             line.counters.insert(key, number);
         }
     }

@@ -54,9 +54,9 @@
     change("PUT", pathOf(signal), value + suffix, done);
   }
 
-  function release(signal) {
+  function release(signal, isQuiet = false) {
     if (!signal || !mayForce) return;
-    change("DELETE", pathOf(signal), undefined, `${signal.name} is released${bar.moment ? " now; the page shows the past" : ""}.`);
+    change("DELETE", pathOf(signal), undefined, isQuiet ? "" : `${signal.name} is released${bar.moment ? " now; the page shows the past" : ""}.`);
   }
 
   /** True if a signal can be forced now; says why if not. */
@@ -356,10 +356,12 @@
     tabs: views.tabs,
     link: () => (isRecording() ? ["recording", ""] : bar.moment ? ["paused", "stale"] : null),
     news(text) {
-      const { isOther, isLine } = plant.hear(text);
-      if (isOther) renew();
-      if (isLine) line.show();
+      const heard = plant.hear(text);
+      if (!heard) return false;
+      if (heard.isOther) renew();
+      if (heard.isLine) line.show();
       redraw();
+      return true;
     },
     access(isRight, refusal) {
       mayForce = isRight;

@@ -7,6 +7,7 @@ use tickbus_fieldbus::LinkState;
 use tickbus_image::signal::Signal;
 
 use crate::exhibit::{Exhibit, Freshness};
+use crate::line::is_of_one_fault;
 use crate::model::Model;
 use crate::sheet::{FAIL_SAFE, FORCED, STALE, UNKNOWN};
 
@@ -201,7 +202,7 @@ fn statistics(families: &mut Families, labels: &Labels, driver: &dyn Exhibit) {
         })
     };
     for (key, value) in statistics.iter() {
-        if is_of_distribution(key) {
+        if is_of_distribution(key) || is_of_one_fault(key) {
             continue;
         }
         let number = match value {

@@ -135,9 +135,10 @@ const plant = (() => {
     }
   }
 
-  /** Applies an event. Returns whether the signals were replaced, and whether the line has changed. */
+  /** Applies an event. Returns whether the signals were replaced, and whether the line has changed; null for one of another kind of page. */
   function hear(text) {
     const event = JSON.parse(text);
+    if (event.layout === undefined) return null;
     time = event.time_ms;
     heard = performance.now();
     const isFull = event.full === true;
@@ -169,6 +170,7 @@ const plant = (() => {
 
   /** Shows a moment of a driver's past: its answer, with all signals or those that differ from the moment shown now. */
   function showPast(driver, moment, isStep) {
+    if (!isPast) for (const signal of signals) if (!signal.driver.past) show(signal, null, "", null, 0);
     isPast = true;
     for (const [index, value, raw = null, edges = null, flags = 0] of moment.values) {
       const signal = driver.signals[index];

@@ -222,9 +222,9 @@ const touch = (() => {
     const signal = part.signals[0];
     if (!isQuiet) reveal(signal, part);
     if (!act.canForce(signal)) return;
-    if (plant.isForcedNow(signal)) return act.release(signal);
+    if (plant.isForcedNow(signal)) return act.release(signal, isQuiet);
     const to = plant.measured(signal) > 0.5 ? "FALSE" : "TRUE";
-    act.change("PUT", act.pathOf(signal), to, `${signal.name} is turned to ${to}.`);
+    act.change("PUT", act.pathOf(signal), to, isQuiet ? "" : `${signal.name} is turned to ${to}.`);
   }
 
   // Pointer and keys.

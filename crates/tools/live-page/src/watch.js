@@ -128,8 +128,9 @@ const watch = (() => {
     const wasChanged = isChanged();
     if (wanted !== null) return openWanted();
     const isThere = names().includes(view.name);
-    const parts = new Map(partsOf(view.name));
-    if (isThere && !isSame([...parts], [...read])) {
+    // The part of a driver that has left, or does not answer, is as it was.
+    const parts = new Map([...read].filter(([driver]) => !files.has(driver)).concat(partsOf(view.name)).sort(([a], [b]) => a - b));
+    if (isThere && !isSame([...parts], [...read].sort(([a], [b]) => a - b))) {
       if (!read.size) {
         // After a reload, what was changed here and is not saved stays.
         read = parts;
@@ -174,18 +175,22 @@ const watch = (() => {
     return answer?.ok === true;
   }
 
-  /** Saves the list under a name; a name of another list is refused by the server. */
+  /** Saves the list under a name, which no other list has. */
   async function save(name) {
-    let isDone = true;
     const isNew = name !== view.name;
+    if (isNew && names().includes(name)) {
+      act.say(`There is a list "${name}" already, which is not overwritten; take another name.`, true);
+      return false;
+    }
+    const written = isNew ? new Map() : read;
     for (const driver of files.keys()) {
       const was = isNew ? null : read.get(driver) ?? null;
       const is = part(driver, name);
       if (isSame(was, is)) continue;
-      isDone = await replace(driver, "list", was, is) && isDone;
-      if (!isDone) return false;
-      read.set(driver, is);
+      if (!await replace(driver, "list", was, is)) return false;
+      written.set(driver, is);
     }
+    read = written;
     view.name = name;
     views.list = name;
     await look();

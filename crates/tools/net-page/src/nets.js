@@ -159,8 +159,11 @@
     lost: "No connection to the nets.",
     link: () => (isHeld ? ["held still", "stale"] : null),
     news(text) {
-      latest = JSON.parse(text);
+      const state = JSON.parse(text);
+      if (!state.sets) return false;
+      latest = state;
       if (!isHeld || latest.run !== run) display(latest);
+      return true;
     },
     access() {},
   });

@@ -9,6 +9,7 @@
   let file = null;
   let seen = "0";
   let mayEdit = false;
+  let isClosed = false;
   /** The request for the state that is under way, and the one after it. */
   let reading = null;
   let next = null;
@@ -37,15 +38,29 @@
   async function ask() {
     try {
       const answer = await room.ask(`${running.base}/state/${seen}`, {});
+      // Its driver has left the room.
+      showClosed(answer.status === 404);
       if (answer.ok) {
         const state = await answer.json();
         if (state.state !== seen) take(state);
+      } else if (isClosed) {
+        say("This driver has been closed. Open it again, or choose another page.", true);
       } else {
         say((await answer.json()).text, true);
       }
     } catch {
       // The tag beside the title says that nobody answers.
     }
+  }
+
+  function showClosed(isNow) {
+    if (isNow === isClosed) return;
+    isClosed = isNow;
+    // If it is opened again, its file is shown anew.
+    seen = "0";
+    document.querySelector("main").inert = isClosed;
+    document.body.classList.toggle("is-closed", isClosed);
+    head.showLink();
   }
 
   /** Puts a state together from the last one and what has changed since. */
@@ -384,15 +399,18 @@
     may: "may edit",
     mayNot: "Open the address that was printed, with its token: without it the studio shows nothing",
     lost: "No connection to the studio.",
+    link: () => (isClosed ? ["closed", "bad"] : null),
     news(text) {
-      const { isLine } = plant.hear(text);
-      if (isLine) showLine();
-      if (isDue) return;
+      const heard = plant.hear(text);
+      if (!heard) return false;
+      if (heard.isLine) showLine();
+      if (isDue) return true;
       isDue = true;
       requestAnimationFrame(() => {
         isDue = false;
         showValues();
       });
+      return true;
     },
     async access(isRight, refusal) {
       mayEdit = isRight;

@@ -18,6 +18,8 @@ const room = (() => {
   let heard = 0;
   /** True after the first state. */
   let isKnown = false;
+  /** True if the page has taken the newest state. */
+  let isTaken = false;
 
   /** Takes the token from behind "#", which browsers never send, and removes it from the address at once; true if there was one. */
   function takeToken() {
@@ -60,6 +62,15 @@ const room = (() => {
     tell.age(now - heard > PATIENCE || !isOpen, Math.round((now - heard) / 1000), isKnown);
   }
 
+  /** Hands a state to the page. If it is that of another kind of page, its program has the address of this one now. */
+  function takeState(data) {
+    isTaken = false;
+    isTaken = tell.news(data) !== false;
+    // Not before the first state: a page that fits nothing is not loaded again and again.
+    if (!isTaken && isKnown && !tell.page) location.reload();
+    isKnown ||= isTaken;
+  }
+
   function take(message) {
     if (message.isOpen !== undefined) {
       isOpen = message.isOpen;
@@ -68,12 +79,9 @@ const room = (() => {
       tell.tabs?.(message.tabs);
       return;
     } else if (message.page === page) {
-      heard = performance.now();
       try {
-        if (message.data) {
-          isKnown = true;
-          tell.news(message.data);
-        }
+        if (message.data) takeState(message.data);
+        if (isTaken) heard = performance.now();
       } catch (error) {
         // A defect of the page does not end the connection.
         reportError(error);
@@ -107,7 +115,8 @@ const room = (() => {
   }
 
   /**
-   * Listens forever. `news` gets each state as text, of this page or of `page`; `tabs` the list of the room's tabs, as text;
+   * Listens forever. `news` gets each state as text, of this page or of `page`, and returns false for that of another kind of
+   * page; `tabs` the list of the room's tabs, as text;
    * `access` whether changes are allowed and, if a token was refused, why;
    * `age` twice a second whether the displayed state is old, by how many seconds, and if there is any.
    */

@@ -245,7 +245,7 @@ impl Feed {
 
 impl Viewer {
     /// Has the next event be of a look that begins from now on: who asks once must not get what was true before.
-    pub(crate) fn looking_from_now(mut self) -> Self {
+    pub(crate) fn starting_now(mut self) -> Self {
         self.changes = self.feed.changes.fetch_add(1, Ordering::Relaxed) + 1;
         self
     }

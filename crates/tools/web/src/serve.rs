@@ -168,7 +168,7 @@ async fn get(
             .subscribe(if page.is_empty() { "/" } else { page })
     };
     if let Some(viewer) = viewer("/state") {
-        let mut viewer = viewer.looking_from_now();
+        let mut viewer = viewer.starting_now();
         let state = timeout(hall.patience, viewer.next()).await;
         let state = state.map_err(|_| hung())?;
         return Ok(full(JSON, json(&state.ok_or_else(nobody)?)));

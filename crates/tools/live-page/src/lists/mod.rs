@@ -6,6 +6,7 @@ mod edit;
 mod file;
 
 use std::collections::BTreeMap;
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -66,12 +67,7 @@ pub(crate) fn document(Beside { path, signals }: &Beside) -> String {
     let opened = OnDisk::open(path);
     let (contents, mistakes) = match &opened {
         Ok(disk) => read(&file, disk.text()),
-        // Without the folder, which is of no use to somebody at another computer.
-        Err(why) => {
-            let folder = path.parent().map(|folder| folder.display().to_string());
-            let why = why.replace(&format!("{}/", folder.unwrap_or_default()), "");
-            (Contents::default(), vec![why])
-        }
+        Err(why) => (Contents::default(), vec![without_folder(path, why)]),
     };
     let told = told(&contents, signals);
     let Contents { lists, sets, .. } = contents;
@@ -106,7 +102,7 @@ where
         is.check(signals)
             .map_err(|text| Refused { status: 400, text })?;
     }
-    let mut disk = OnDisk::open(path).map_err(|why| unsaved(&file, &why))?;
+    let mut disk = OnDisk::open(path).map_err(|why| unsaved(path, &why))?;
     let (contents, mistakes) = read(&file, disk.text());
     if let Some(first) = mistakes.first() {
         let text = format!("{first}; nothing is saved until that is corrected, by hand");
@@ -129,7 +125,7 @@ where
         return Err(Refused { status: 409, text });
     }
     let text = edit::replaced(disk.text(), &name, change.is.as_ref())
-        .map_err(|why| unsaved(&file, &why))?;
+        .map_err(|why| unsaved(path, &why))?;
     // The reader has all rules of names and values.
     if let (_, mistakes) = read(&file, &text)
         && let Some(first) = mistakes.into_iter().next()
@@ -143,7 +139,7 @@ where
             409,
             format!("{file} has just been changed by another program; make your change again"),
         )),
-        Err(Unwritten::Refused(why)) => Err(unsaved(&file, &why)),
+        Err(Unwritten::Refused(why)) => Err(unsaved(path, &why)),
     }
 }
 
@@ -153,9 +149,18 @@ fn refused(status: u16, text: impl Into<String>) -> Refused {
 }
 
 /// The file is as it was.
-fn unsaved(file: &str, why: &str) -> Refused {
+fn unsaved(path: &Path, why: &str) -> Refused {
+    let (file, why) = (name_of(path), without_folder(path, why));
     let text = format!("{file} is not saved, and is as it was: {why}");
     Refused { status: 409, text }
+}
+
+/// A text about the file without its folder, which is of no use to somebody at another computer.
+fn without_folder(path: &Path, why: &str) -> String {
+    // Texts of the system have the path that it found.
+    let found = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let why = why.replace(&*found.to_string_lossy(), &name_of(&found));
+    why.replace(&*path.to_string_lossy(), &name_of(path))
 }
 
 fn name_of(path: &Path) -> String {

@@ -283,3 +283,25 @@ fn a_file_that_cannot_be_written_is_as_it_was() {
         "tank.lists.toml is not saved, and is as it was: no new file can be made in /proc/self";
     assert!(refused.text.starts_with(told), "{}", refused.text);
 }
+
+#[test]
+fn a_mistake_is_told_without_the_folder_and_with_all_else() {
+    let Folder { folder, mut beside } = Folder::new(None);
+    fs::write(&beside.path, [0xff]).expect("there is room");
+    fs::create_dir(folder.path().join("sub")).expect("there is room");
+    beside.path = folder.path().join("sub/../tank.lists.toml");
+    let folder = Folder { folder, beside };
+    let name = folder.folder.path().display().to_string();
+    let mistakes = folder.seen()["mistakes"].to_string();
+    let (_, why) = folder
+        .put("list", &Value::Null, &list("b", &[]))
+        .expect_err("no text");
+    for told in [mistakes, why] {
+        assert!(
+            told.contains("tank.lists.toml") && !told.contains(&name),
+            "{told}"
+        );
+    }
+    let other = "half of the file is on and/or off";
+    assert_eq!(without_folder(Path::new("tank.lists.toml"), other), other);
+}

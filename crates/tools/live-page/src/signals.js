@@ -194,8 +194,10 @@ const plant = (() => {
     const isStale = (status) => status < 0 || status > 1;
     const statuses = moment.stations.length ? moment.stations : [moment.status];
     const known = moment.line ?? { state: isStale(moment.status) ? "stale" : "running", cause: "unknown", reason: "", events: [] };
+    // Before it took its present settings, the line may have had another address.
+    const isOther = line.events.some(({ kind, ago_ms }) => kind === "settings" && ago_ms < now(driver) - moment.ms);
     return {
-      ...line, ...known, next_ms: undefined,
+      ...line, ...known, next_ms: undefined, address: isOther ? undefined : line.address,
       isPast: true,
       status: ["fresh", "unchanged"][moment.status] ?? "stale",
       stations: line.stations.map((station, i) => {

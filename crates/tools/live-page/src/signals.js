@@ -195,7 +195,7 @@ const plant = (() => {
     const statuses = moment.stations.length ? moment.stations : [moment.status];
     const known = moment.line ?? { state: isStale(moment.status) ? "stale" : "running", cause: "unknown", reason: "", events: [] };
     // Before it took its present settings, the line may have had another address.
-    const isOther = line.events.some(({ kind, ago_ms }) => kind === "settings" && ago_ms < now(driver) - moment.ms);
+    const isOther = line.events?.some(({ kind, ago_ms }) => kind === "settings" && ago_ms < now(driver) - moment.ms);
     return {
       ...line, ...known, next_ms: undefined, address: isOther ? undefined : line.address,
       isPast: true,

@@ -565,9 +565,10 @@ fn a_plc_that_is_gone_is_not_shown_as_one_that_is_there() {
     let mut machine = Machine::rig();
     let browser = open(&machine, 1280, 900);
     let overlay = "document.querySelector('.picture').classList.contains('is-stale')";
-    // Before the first contact the values are unknown.
+    // Before the first contact the values are unknown, but for those that the machine has instead.
     browser.wait(overlay);
-    browser.wait("plant.signals.every((it) => it.direction !== 'Q' || it.value === null)");
+    browser.wait("plant.signals.every((it) => it.direction !== 'Q' || (it.value === null) !== it.isFailSafe)");
+    browser.wait("plant.signals.some((it) => it.value === null)");
     let mut plc = machine.plc();
     browser.wait(&format!("!{overlay}"));
     browser.wait("plant.signals.every((it) => !it.isStale)");

@@ -275,6 +275,8 @@ fn the_tabs_lead_from_page_to_page_with_the_same_head() {
     ] {
         let tab = format!("#tabs [href=\"{to}\"]");
         browser.wait(&format!("document.querySelector('{tab}')"));
+        // Until it is live, the head may still move.
+        browser.wait("document.getElementById('link').textContent === 'live'");
         click(&browser, &tab);
         browser.wait(&format!("location.pathname + location.hash === '{to}'"));
         let page = to.split('#').next().expect("a path");

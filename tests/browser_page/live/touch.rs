@@ -126,6 +126,8 @@ fn a_part_tells_its_signal_is_found_in_the_list_and_opens_its_trend() {
     browser.wait("document.activeElement.id === 'force-value'");
     browser.keys(&format!("100{ENTER}"));
     wait_said(&browser, "Level is forced to 100 mm.");
+    // The alarm at the top moves the picture.
+    browser.wait("!document.getElementById('forced').hidden");
     point(&browser, "mouse", "level", &[]);
     browser.wait(&format!("{tip}?.startsWith('Level: 100.00 mm, forced')"));
     assert_quiet(&browser);

@@ -110,7 +110,9 @@ fn a_condition_is_about_the_driver_whose_signals_it_names() {
     ));
     browser.wait("trigger.isArmed");
     wait_said(&browser, "Fast level > ");
-    browser.wait(&format!("bar.moment && {level} === limit + 1"));
+    browser.wait(&format!(
+        "plant.drivers.every(({{ moment }}) => moment) && {level} === limit + 1"
+    ));
     let told = browser.run("return words.moment(bar.moment.ms)");
     wait_said(
         &browser,

@@ -219,7 +219,7 @@ impl Archive {
                 marks::keep(marks, mark, MOST);
             }
         }
-        // What is no longer on the list is over.
+        // A fault that has left the list has ended.
         let is_listed = |id: u32| faults.iter().any(|fault| fault.id == id);
         let newest = faults.iter().map(|fault| fault.id).max().unwrap_or(0);
         seen.retain(|known| is_listed(known.id));

@@ -68,7 +68,7 @@ impl Archive {
         marks
     }
 
-    /// The marks of the ticks that the history has; of very many some, since the bar of time has so many pixels.
+    /// The marks of the ticks that the history has. Of more than `MOST`, some are left out: the bar of time has fewer pixels.
     pub(super) fn marks_of(&self, span: Option<Span>) -> Vec<Mark> {
         let Some(Span { first, last, .. }) = span else {
             return Vec::new();

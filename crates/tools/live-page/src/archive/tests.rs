@@ -16,7 +16,7 @@ fn archive() -> Archive {
     archive_within(1 << 20, 20)
 }
 
-/// The same of so many ticks, in so much memory.
+/// An archive of this many ticks, whose history may take `limit` bytes.
 fn archive_within(limit: usize, ticks: u64) -> Archive {
     let table = SignalTable {
         signals: vec![Signal {
@@ -292,7 +292,7 @@ fn a_trend_ends_where_the_forces_are_known() {
     assert_eq!(trend("0/0/30")["to_ms"], 20.0);
     archive.note_faults(&[], 0, 10);
     assert_eq!(trend("0/0/30")["to_ms"], 10.0);
-    // It begins later.
+    // This trend begins after the last tick whose forces are known.
     assert_eq!(trend("0/12/30")["to_ms"], 10.0);
     archive.note_force(1, Way::Once.force(0, Slot::from_real(7.0), None));
     archive.note_faults(&[forced(1, Phase::Over, 1, 16)], 0, 20);

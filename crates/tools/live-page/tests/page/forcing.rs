@@ -49,7 +49,7 @@ fn a_pulse_lasts_its_time_and_nobody_has_to_end_it() {
     assert_eq!(page.change("PUT /force/1/out", "9 for 40ms").0, 200);
     let times = wait(&page, &[0.0, 9.0, 0.0]);
     assert_eq!(times[2] - times[1], 40.0);
-    // It is counted, and has no metrics of its own.
+    // The total counts the fault, and the fault has no series of its own.
     let metrics = page.ask("GET /metrics", "", "").1;
     assert!(
         metrics.contains("tickbus_faults_begun_total{") && !metrics.contains("key=\"fault.1."),
